@@ -1,0 +1,8 @@
+//! Searoom: a physics-grounded maritime simulator in which an agent learns to keep clear of other
+//! vessels, and the place where anyone can check how well it does.
+//!
+//! Data flows one way, top to bottom:
+
+pub mod angle;
+pub mod geo;
+pub mod track;

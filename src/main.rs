@@ -1,0 +1,3 @@
+//! The `searoom` program.
+
+fn main() {}
