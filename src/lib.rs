@@ -4,5 +4,6 @@
 //! Data flows one way, top to bottom:
 
 pub mod angle;
+pub mod forecast;
 pub mod geo;
 pub mod track;
