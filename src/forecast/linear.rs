@@ -36,9 +36,9 @@ impl Forecaster for LinearForecaster {
         forecasts: &mut Forecasts,
     ) -> Result<(), ForecastError> {
         forecasts.reset(histories.len(), horizon);
-        for index in 0..histories.len() {
-            let basis = basis_of(histories[index], self.history_len);
-            straight_on(index, histories[index], self.history_len, basis, forecasts)?;
+        for (index, history) in histories.iter().enumerate() {
+            let basis = basis_of(history, self.history_len);
+            straight_on(index, history, self.history_len, basis, forecasts)?;
         }
         Ok(())
     }
