@@ -99,7 +99,7 @@ impl Position {
         self.north_m.is_finite() && self.east_m.is_finite()
     }
 
-    /// As a vector with x to the east and y to the north: the right-handed axes of [`crate::cpa`].
+    /// As a vector with x to the east and y to the north: the right-handed axes of `crate::cpa`.
     #[must_use]
     pub fn xy(self) -> Vector2<f64> {
         Vector2::new(self.east_m, self.north_m)
@@ -169,7 +169,7 @@ impl Velocity {
         Displacement { north_m: self.north_mps * duration_s, east_m: self.east_mps * duration_s }
     }
 
-    /// As a vector with x to the east and y to the north: the right-handed axes of [`crate::cpa`].
+    /// As a vector with x to the east and y to the north: the right-handed axes of `crate::cpa`.
     #[must_use]
     pub fn xy(self) -> Vector2<f64> {
         Vector2::new(self.east_mps, self.north_mps)
