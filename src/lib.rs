@@ -5,5 +5,6 @@
 
 pub mod angle;
 pub mod forecast;
+pub mod encounter;
 pub mod geo;
 pub mod track;
