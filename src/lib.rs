@@ -4,7 +4,7 @@
 //! Data flows one way, top to bottom:
 
 pub mod angle;
-pub mod forecast;
 pub mod encounter;
+pub mod forecast;
 pub mod geo;
 pub mod track;
