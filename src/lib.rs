@@ -7,4 +7,5 @@ pub mod angle;
 pub mod encounter;
 pub mod forecast;
 pub mod geo;
+pub mod scenario;
 pub mod track;

@@ -1,0 +1,3 @@
+//! Scripted encounters.
+
+pub mod encounter_starts;
