@@ -4,6 +4,7 @@
 //! Data flows one way, top to bottom:
 
 pub mod angle;
+pub mod cpa;
 pub mod encounter;
 pub mod forecast;
 pub mod geo;
