@@ -10,3 +10,4 @@ pub mod forecast;
 pub mod geo;
 pub mod scenario;
 pub mod track;
+pub mod vessel;
