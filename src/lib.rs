@@ -6,6 +6,7 @@
 pub mod angle;
 pub mod cpa;
 pub mod encounter;
+pub mod episode;
 pub mod forecast;
 pub mod geo;
 pub mod scenario;
