@@ -12,3 +12,7 @@ pub mod geo;
 pub mod scenario;
 pub mod track;
 pub mod vessel;
+
+pub mod atomic_file;
+pub mod cli;
+pub mod config;

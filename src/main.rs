@@ -1,3 +1,5 @@
 //! The `searoom` program.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    searoom::cli::run(std::env::args_os())
+}
