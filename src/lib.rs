@@ -9,6 +9,7 @@ pub mod encounter;
 pub mod episode;
 pub mod forecast;
 pub mod geo;
+pub mod nn;
 pub mod scenario;
 pub mod track;
 pub mod vessel;

@@ -19,6 +19,7 @@ use thiserror::Error;
 use crate::geo::Position;
 
 mod linear;
+pub mod network;
 mod segment;
 mod split;
 
