@@ -1,12 +1,23 @@
 //! How close two vessels will come, and when: the closest point of approach (CPA).
 //!
+//! - [`linear`]: the closed form for two straight motions.
+//! - [`sampled`]: the smallest smoothed distance over the steps of a forecast.
+//! - [`refined`]: the smallest smoothed distance over all times of that forecast.
+//! - [`Estimator`] serves many target ships per decision, by either of the last two.
+//!
 //! Positions and velocities are vectors of one right-handed plane, whichever it is: x east and y
 //! north in coastal waters ([`Position::xy`](crate::geo::Position::xy)), x ahead and y to port in
 //! the open-water field. Distances and times do not depend on the choice.
 //!
-//! Time 0 is now. A CPA in the past has a negative time.
+//! Time 0 is now. A CPA in the past has a negative time. A position that is not finite, or too few
+//! of them, gives [`Cpa::UNKNOWN`].
 
+mod estimator;
 pub mod linear;
+pub mod refined;
+pub mod sampled;
+
+pub use estimator::{CpaConfig, CpaMethod, Estimator, StraightMotion};
 
 use serde::{Deserialize, Serialize};
 
