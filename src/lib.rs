@@ -17,3 +17,4 @@ pub mod vessel;
 pub mod atomic_file;
 pub mod cli;
 pub mod config;
+pub mod world;
