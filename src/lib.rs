@@ -18,3 +18,4 @@ pub mod atomic_file;
 pub mod cli;
 pub mod config;
 pub mod world;
+pub mod env;
