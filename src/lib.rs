@@ -17,5 +17,6 @@ pub mod vessel;
 pub mod atomic_file;
 pub mod cli;
 pub mod config;
-pub mod world;
 pub mod env;
+pub mod rl;
+pub mod world;

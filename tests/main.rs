@@ -4,3 +4,5 @@ mod architecture;
 mod cli;
 mod cpa;
 mod forecast_network;
+mod rl_golden;
+mod rl_learning;
