@@ -18,5 +18,6 @@ pub mod atomic_file;
 pub mod cli;
 pub mod config;
 pub mod env;
+pub mod report;
 pub mod rl;
 pub mod world;

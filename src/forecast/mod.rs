@@ -18,14 +18,30 @@ use thiserror::Error;
 
 use crate::geo::Position;
 
+mod best_linear;
+pub mod dataset;
+mod encoding;
+mod evaluate;
 mod linear;
+mod lstm;
+mod model;
 pub mod network;
 mod segment;
 mod split;
+mod training;
 
+pub use best_linear::BestLinearForecaster;
+pub use encoding::Scaling;
+pub use evaluate::{
+    Errors, Evaluation, EvaluationConfig, EvaluationError, NoiseErrors, RouteErrors, StepErrors, evaluate,
+    quantiles_of,
+};
 pub use linear::LinearForecaster;
+pub use lstm::LstmForecaster;
+pub use model::{DataConfig, Model, ModelConfig, ModelError, ModelKind};
 pub use segment::{Quantiles, Segment, rmse_m};
 pub use split::{Split, SplitConfig, SplitError, split_by_time};
+pub use training::{StageConfig, Trainer, TrainingConfig, TrainingConfigError, Update};
 
 /// Predicts a batch of paths.
 pub trait Forecaster: Send {

@@ -82,7 +82,7 @@ pub struct NetworkState<T> {
 /// A batch: what a network reads.
 #[derive(Debug, Clone, Copy)]
 pub struct Batch<'a, T> {
-    /// Displacements, oldest first, `[steps][rows][2]`.
+    /// Displacements, oldest first, `[steps][rows][2]`; at most as many steps as the network is made for.
     pub histories: &'a [T],
     /// Present positions, `[rows][2]`; not looked at unless the network is anchored.
     pub anchors: &'a [T],
@@ -179,7 +179,7 @@ impl<T: Real> ForecastNetwork<T> {
         state: &'s mut NetworkState<T>,
     ) -> &'s [T] {
         let Batch { histories, anchors, rows } = batch;
-        let steps = self.config.steps;
+        let steps = histories.len() / (rows.max(1) * COORDINATES);
         self.lstm.forward(compute, &self.parameters, histories, steps, rows, None, &mut state.lstm);
         let width = self.linear[0].inputs();
         state.lstm.read_last(None, &mut state.joined, width);
@@ -207,11 +207,32 @@ impl<T: Real> ForecastNetwork<T> {
         gradients: &mut Gradients<T>,
     ) -> f64 {
         self.forward(compute, batch, state);
-        let Batch { histories, rows, .. } = batch;
         let last = self.linear.len() - 1;
-        let count = rows * self.config.outputs();
+        let count = batch.rows * self.config.outputs();
         let output = &state.outputs[last][..count];
         let loss = mean_squared_error(output, &targets[..count], &mut state.d_outputs[last][..count]);
+        self.backward(compute, batch, state, gradients);
+        loss
+    }
+
+    /// The output of the last [`forward`](Self::forward) and the place for the derivative of a loss with
+    /// respect to it, both `[rows][outputs]`, before [`backward`](Self::backward).
+    pub fn loss_buffers<'s>(&self, rows: usize, state: &'s mut NetworkState<T>) -> (&'s [T], &'s mut [T]) {
+        let last = self.linear.len() - 1;
+        let count = rows * self.config.outputs();
+        (&state.outputs[last][..count], &mut state.d_outputs[last][..count])
+    }
+
+    /// Adds the gradients of a loss of the caller's own, whose derivative stands in
+    /// [`loss_buffers`](Self::loss_buffers).
+    pub fn backward(
+        &self,
+        compute: &mut Compute,
+        batch: Batch<'_, T>,
+        state: &mut NetworkState<T>,
+        gradients: &mut Gradients<T>,
+    ) {
+        let Batch { histories, rows, .. } = batch;
         for (index, layer) in self.linear.iter().enumerate().rev() {
             let input = if index == 0 { &state.joined } else { &state.outputs[index - 1] };
             let (before, from_here) = state.d_outputs.split_at_mut(index);
@@ -237,7 +258,6 @@ impl<T: Real> ForecastNetwork<T> {
             None,
             Some(gradients),
         );
-        loss
     }
 }
 

@@ -10,12 +10,16 @@ use crate::geo::Position;
 pub struct Segment {
     /// Positions seen, oldest first.
     pub history: Vec<Position>,
+    /// Where the vessel truly is at the end of the history.
+    pub present: Position,
     /// Positions that follow, one for each step of the horizon.
     pub future: Vec<Position>,
     /// The vessel, where the path is a recorded one.
     pub mmsi: Option<u32>,
     /// Time of the first position in seconds since 1970, where the path is a recorded one.
     pub start_unix_s: Option<f64>,
+    /// Standard deviation of the noise that was added to the history, in metres on each axis.
+    pub noise_m: f64,
 }
 
 impl Segment {
@@ -103,7 +107,14 @@ mod tests {
         let positions = |points: &[(f64, f64)]| {
             points.iter().map(|&(north_m, east_m)| Position { north_m, east_m }).collect()
         };
-        Segment { history: positions(history), future: positions(future), mmsi: None, start_unix_s: None }
+        Segment {
+            history: positions(history),
+            present: Position::ORIGIN,
+            future: positions(future),
+            mmsi: None,
+            start_unix_s: None,
+            noise_m: 0.0,
+        }
     }
 
     #[test]

@@ -1,0 +1,609 @@
+//! Learning to forecast: the paths of a batch are extended call by call, as in use, and every call learns
+//! from where the calls before it have led.
+//!
+//! The loss of a call is the mean squared difference between the displacements given and those wanted: the
+//! vessel's own, plus an even share of the way from where the path is to where the vessel was, so that a
+//! path off the truth learns to come back within `recovery_steps`. What the calls before it did is taken as
+//! given (no gradient runs through them). Since what a call is shown follows from the history alone, the
+//! wanted displacements have their conditional mean given the history as the best answer at every step, and
+//! sum up to that of the position. One call (`calls = 1`) is the paper's training on true histories.
+//!
+//! A segment seen with noise of standard deviation `s` weighs `1 / (1 + (s / noise_reference_m)^2)`: what
+//! noise makes unpredictable would drown what is not.
+
+use std::f64::consts::PI;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Segment;
+use super::dataset::SegmentSource;
+use super::encoding::{Encoding, Paths, Scaling};
+use super::model::ModelKind;
+use super::network::{Batch, ForecastNetwork, NetworkState};
+use crate::geo::{Displacement, Position};
+use crate::nn::{Adam, AdamConfig, Compute, Gradients, Parameters};
+
+/// A part of the training with settings of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StageConfig {
+    /// Updates.
+    pub steps: u64,
+    /// Segments in an update.
+    pub batch: usize,
+    /// Calls of the network that a path is unrolled over.
+    pub calls: usize,
+    /// Displacements of the history shown; all that the network is made for if 0. Fewer are faster.
+    pub history_steps: usize,
+    /// Steps over which a path off the truth should come back; 0 for not at all.
+    pub recovery_steps: usize,
+    /// Peak of the one-cycle schedule.
+    pub learning_rate: f64,
+    /// Part of the stage over which the rate rises from `initial_fraction` of its peak; then it falls to
+    /// nothing, both along a cosine.
+    pub warmup: f64,
+    /// Where the rate starts, as a fraction of its peak.
+    pub initial_fraction: f64,
+}
+
+impl Default for StageConfig {
+    fn default() -> Self {
+        Self {
+            steps: 5000,
+            batch: 32,
+            calls: 1,
+            history_steps: 0,
+            recovery_steps: 0,
+            learning_rate: 2e-3,
+            warmup: 0.25,
+            initial_fraction: 0.04,
+        }
+    }
+}
+
+impl StageConfig {
+    /// The learning rate of update `step` of this stage.
+    #[must_use]
+    pub fn learning_rate_at(&self, step: u64) -> f64 {
+        let done = step as f64 / self.steps.max(1) as f64;
+        if done < self.warmup {
+            let risen = 0.5 * (1.0 - (PI * done / self.warmup).cos());
+            self.learning_rate * (self.initial_fraction + (1.0 - self.initial_fraction) * risen)
+        } else {
+            self.learning_rate * 0.5 * (1.0 + (PI * (done - self.warmup) / (1.0 - self.warmup)).cos())
+        }
+    }
+}
+
+/// How a network is trained.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrainingConfig {
+    /// Seed of the initial weights and of the stream of segments.
+    pub seed: u64,
+    /// Scales of inputs and outputs.
+    pub scaling: Scaling,
+    /// The weights used are a running mean of the trained ones; this is how much of it stays at each update.
+    pub weight_average: f64,
+    /// Gradients longer than this are shortened to it.
+    pub max_gradient_norm: f64,
+    /// Noise at which a segment weighs half, in metres.
+    pub noise_reference_m: f64,
+    /// The optimiser's settings.
+    pub adam: AdamConfig,
+    /// One after the other.
+    pub stages: Vec<StageConfig>,
+}
+
+impl Default for TrainingConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            scaling: Scaling::default(),
+            weight_average: 0.998,
+            max_gradient_norm: 10.0,
+            noise_reference_m: 2.0,
+            adam: AdamConfig::default(),
+            stages: vec![StageConfig::default()],
+        }
+    }
+}
+
+/// What is wrong with a training configuration.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("key \"{key}\" is {value}; {remedy}")]
+pub struct TrainingConfigError {
+    /// The key at fault.
+    pub key: String,
+    /// Its value.
+    pub value: String,
+    /// What to write instead.
+    pub remedy: &'static str,
+}
+
+impl TrainingConfig {
+    /// Updates of all stages.
+    #[must_use]
+    pub fn total_steps(&self) -> u64 {
+        self.stages.iter().map(|stage| stage.steps).sum()
+    }
+
+    /// The most calls of any stage: a segment's horizon is that many times the network's outputs.
+    #[must_use]
+    pub fn most_calls(&self) -> usize {
+        self.stages.iter().map(|stage| stage.calls).max().unwrap_or(1)
+    }
+
+    /// Checks ranges.
+    ///
+    /// # Errors
+    ///
+    /// For the first value out of range.
+    pub fn check(&self, kind: ModelKind) -> Result<(), TrainingConfigError> {
+        let fault = |key: &str, value: &dyn ToString, remedy| {
+            Err(TrainingConfigError { key: key.to_owned(), value: value.to_string(), remedy })
+        };
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        if !positive(self.scaling.step_m) {
+            return fault("scaling.step_m", &self.scaling.step_m, "use a positive number of metres");
+        }
+        if !positive(self.scaling.anchor_m) {
+            return fault("scaling.anchor_m", &self.scaling.anchor_m, "use a positive number of metres");
+        }
+        if !(0.0..1.0).contains(&self.weight_average) {
+            return fault(
+                "weight_average",
+                &self.weight_average,
+                "use a number from 0 up to, not including, 1",
+            );
+        }
+        if !positive(self.max_gradient_norm) {
+            return fault("max_gradient_norm", &self.max_gradient_norm, "use a positive number");
+        }
+        if !positive(self.noise_reference_m) {
+            return fault("noise_reference_m", &self.noise_reference_m, "use a positive number of metres");
+        }
+        if self.total_steps() == 0 {
+            return fault("stages", &"without steps", "give at least one [[training.stages]] with steps > 0");
+        }
+        let history_steps = kind.history_len() - 1;
+        for (index, stage) in self.stages.iter().enumerate() {
+            let key = |name: &str| format!("stages[{index}].{name}");
+            if stage.batch == 0 {
+                return fault(&key("batch"), &0, "use 1 or more");
+            }
+            if stage.calls == 0 {
+                return fault(&key("calls"), &0, "use 1 or more");
+            }
+            if stage.history_steps > history_steps {
+                let remedy =
+                    "use at most the displacements that the network reads (9 open water, 74 coastal)";
+                return fault(&key("history_steps"), &stage.history_steps, remedy);
+            }
+            if !positive(stage.learning_rate) {
+                return fault(&key("learning_rate"), &stage.learning_rate, "use a positive number");
+            }
+            if !(0.0..1.0).contains(&stage.warmup) {
+                return fault(&key("warmup"), &stage.warmup, "use a number from 0 up to, not including, 1");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What one update did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Update {
+    /// Updates done, this one included.
+    pub step: u64,
+    /// Mean weighted squared error of a displacement, in square metres.
+    pub loss_m2: f64,
+    /// The learning rate used.
+    pub learning_rate: f64,
+    /// Length of the gradient before it was shortened.
+    pub gradient_norm: f64,
+}
+
+/// A training run: everything that changes from update to update, and nothing else.
+pub struct Trainer {
+    pub(super) config: TrainingConfig,
+    pub(super) network: ForecastNetwork<f32>,
+    pub(super) average: Parameters<f32>,
+    pub(super) adam: Adam<f32>,
+    pub(super) rng: ChaCha8Rng,
+    pub(super) step: u64,
+    gradients: Gradients<f32>,
+    source: Box<dyn SegmentSource>,
+    compute: Compute,
+    unrolled: Unrolled,
+}
+
+/// Stream of the segments' random numbers; the initial weights come from stream 0.
+const SEGMENT_STREAM: u64 = 1;
+
+impl Trainer {
+    /// A run that has not begun.
+    ///
+    /// # Errors
+    ///
+    /// When a setting is out of range.
+    pub fn new(
+        kind: ModelKind,
+        config: TrainingConfig,
+        source: Box<dyn SegmentSource>,
+        threads: usize,
+    ) -> Result<Self, TrainingConfigError> {
+        config.check(kind)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+        let network = ForecastNetwork::new(kind.network(), &mut rng);
+        rng.set_stream(SEGMENT_STREAM);
+        let encoding =
+            Encoding { history_len: kind.history_len(), outputs: kind.outputs(), scaling: config.scaling };
+        Ok(Self {
+            average: network.parameters.frozen(),
+            adam: Adam::new(network.parameters.layout(), config.adam.clone()),
+            gradients: Gradients::zeros(network.parameters.layout()),
+            unrolled: Unrolled::new(encoding, &network),
+            compute: Compute::new(threads),
+            config,
+            network,
+            rng,
+            step: 0,
+            source,
+        })
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn config(&self) -> &TrainingConfig {
+        &self.config
+    }
+
+    /// The weights to use: the running mean.
+    #[must_use]
+    pub fn weights(&self) -> &Parameters<f32> {
+        &self.average
+    }
+
+    /// The stage of the next update and how many updates of it are done; nothing at the end.
+    fn stage(&self) -> Option<(StageConfig, u64)> {
+        let mut before = 0;
+        for stage in &self.config.stages {
+            if self.step < before + stage.steps {
+                return Some((*stage, self.step - before));
+            }
+            before += stage.steps;
+        }
+        None
+    }
+
+    /// Does one update; nothing once all stages are done.
+    pub fn update(&mut self) -> Option<Update> {
+        let (stage, done) = self.stage()?;
+        let segments: Vec<Segment> = (0..stage.batch).map(|_| self.source.draw(&mut self.rng)).collect();
+        let loss_m2 = self.unrolled.loss_and_gradients(
+            &mut self.compute,
+            &self.network,
+            &stage,
+            &segments,
+            self.config.noise_reference_m,
+            &mut self.gradients,
+        );
+        let gradient_norm = shorten(&mut self.gradients, self.config.max_gradient_norm);
+        let learning_rate = stage.learning_rate_at(done);
+        self.adam.step(&mut self.compute, &mut self.network.parameters, &self.gradients, learning_rate);
+        self.step += 1;
+        // The mean forgets the initial weights sooner than its length would allow.
+        let kept = self.config.weight_average.min(self.step as f64 / (9.0 + self.step as f64));
+        self.average.follow(&mut self.compute, &self.network.parameters, 1.0 - kept);
+        Some(Update { step: self.step, loss_m2, learning_rate, gradient_norm })
+    }
+}
+
+/// Scales gradients down to a length; gives the length they had. A gradient that is not finite is dropped.
+fn shorten(gradients: &mut Gradients<f32>, longest: f64) -> f64 {
+    let square: f64 = gradients.values().iter().map(|&g| f64::from(g) * f64::from(g)).sum();
+    let norm = square.sqrt();
+    if !norm.is_finite() {
+        gradients.clear();
+    } else if norm > longest {
+        let scale = (longest / norm) as f32;
+        gradients.values_mut().iter_mut().for_each(|g| *g *= scale);
+    }
+    norm
+}
+
+/// The buffers of an unrolled batch, kept from update to update.
+struct Unrolled {
+    encoding: Encoding,
+    paths: Paths,
+    rows: usize,
+    state: NetworkState<f32>,
+    histories: Vec<f32>,
+    anchors: Vec<f32>,
+}
+
+impl Unrolled {
+    fn new(encoding: Encoding, network: &ForecastNetwork<f32>) -> Self {
+        Self {
+            encoding,
+            paths: Paths::default(),
+            rows: 0,
+            state: network.state(0),
+            histories: Vec::new(),
+            anchors: Vec::new(),
+        }
+    }
+
+    /// Loss of a batch in square metres, and its gradients.
+    fn loss_and_gradients(
+        &mut self,
+        compute: &mut Compute,
+        network: &ForecastNetwork<f32>,
+        stage: &StageConfig,
+        segments: &[Segment],
+        noise_reference_m: f64,
+        gradients: &mut Gradients<f32>,
+    ) -> f64 {
+        let (encoding, rows) = (self.encoding, segments.len());
+        let outputs = encoding.outputs;
+        let steps = match stage.history_steps {
+            0 => encoding.history_len - 1,
+            steps => steps,
+        };
+        if self.rows != rows {
+            self.rows = rows;
+            self.state = network.state(rows);
+        }
+        self.histories.resize(steps * rows * 2, 0.0);
+        self.anchors.resize(rows * 2, 0.0);
+        self.paths.start(&encoding, segments.iter().map(|segment| segment.history.as_slice()), stage.calls);
+        gradients.clear();
+        let terms = (rows * outputs * stage.calls) as f64;
+        let mut loss_m2 = 0.0;
+        for call in 0..stage.calls {
+            self.paths.encode(encoding.scaling, steps, &mut self.histories, &mut self.anchors);
+            let batch = Batch { histories: &self.histories, anchors: &self.anchors, rows };
+            network.forward(compute, batch, &mut self.state);
+            let (output, d_output) = network.loss_buffers(rows, &mut self.state);
+            let given = output.chunks(2 * outputs).zip(d_output.chunks_mut(2 * outputs));
+            for (row, (output, d_output)) in given.enumerate() {
+                let segment = &segments[row];
+                let weight = 1.0 / (1.0 + (segment.noise_m / noise_reference_m).powi(2));
+                let before =
+                    call.checked_sub(1).map_or(segment.present, |_| segment.future[call * outputs - 1]);
+                let truth = &segment.future[call * outputs..(call + 1) * outputs];
+                let wanted = Wanted::new(before, truth, self.paths.now(row), stage.recovery_steps);
+                loss_m2 += wanted.loss(output, encoding.scaling.step_m, weight / terms, d_output);
+            }
+            self.paths.extend(&encoding, output);
+            network.backward(compute, batch, &mut self.state, gradients);
+        }
+        loss_m2
+    }
+}
+
+/// The displacements that one call should give.
+struct Wanted<'a> {
+    /// Where the vessel was at the start of the call, and where it went.
+    before: Position,
+    truth: &'a [Position],
+    /// Part of the way back to the truth, at each of so many steps.
+    way_back: Displacement,
+    recovery_steps: usize,
+}
+
+impl<'a> Wanted<'a> {
+    fn new(before: Position, truth: &'a [Position], now: Position, recovery_steps: usize) -> Self {
+        let way_back = (before - now) * (1.0 / recovery_steps.max(1) as f64);
+        Self { before, truth, way_back, recovery_steps }
+    }
+
+    /// Weighted squared error of displacements in units of `scale_m`; fills their gradient.
+    fn loss(&self, output: &[f32], scale_m: f64, weight: f64, d_output: &mut [f32]) -> f64 {
+        let mut from = self.before;
+        let mut loss = 0.0;
+        let steps = output.chunks_exact(2).zip(d_output.chunks_exact_mut(2));
+        for (k, (&to, (given, gradient))) in self.truth.iter().zip(steps).enumerate() {
+            let back = if k < self.recovery_steps { self.way_back } else { Displacement::default() };
+            let wanted = to - from + back;
+            let north_m = f64::from(given[0]) * scale_m - wanted.north_m;
+            let east_m = f64::from(given[1]) * scale_m - wanted.east_m;
+            loss += weight * (north_m * north_m + east_m * east_m);
+            gradient[0] = (2.0 * weight * scale_m * north_m) as f32;
+            gradient[1] = (2.0 * weight * scale_m * east_m) as f32;
+            from = to;
+        }
+        loss
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dataset::{Process, SyntheticConfig, SyntheticSegments};
+    use super::super::{
+        DataConfig, EvaluationConfig, LstmForecaster, Model, ModelConfig, ModelError, evaluate, quantiles_of,
+    };
+    use super::*;
+    use crate::nn::weights::WeightsFile;
+    use crate::vessel::PeriodicConfig;
+
+    fn config(seed: u64, stages: Vec<StageConfig>) -> ModelConfig {
+        ModelConfig {
+            name: "test".into(),
+            kind: ModelKind::OpenWater,
+            data: DataConfig::Synthetic {
+                process: Process::Periodic(PeriodicConfig::default()),
+                segments: SyntheticConfig::default(),
+            },
+            training: TrainingConfig { seed, stages, ..Default::default() },
+        }
+    }
+
+    fn source(horizon: usize) -> SyntheticSegments {
+        SyntheticSegments {
+            process: Process::Periodic(PeriodicConfig::default()),
+            config: SyntheticConfig { earliest_step: 60, latest_step: 60, ..Default::default() },
+            history_len: 10,
+            horizon,
+        }
+    }
+
+    fn trainer(config: &ModelConfig) -> Trainer {
+        let source = source(config.training.most_calls());
+        Trainer::new(config.kind, config.training.clone(), Box::new(source), 1).unwrap()
+    }
+
+    fn two_stages() -> Vec<StageConfig> {
+        let first = StageConfig { steps: 4, batch: 8, ..Default::default() };
+        vec![first, StageConfig { steps: 4, calls: 3, history_steps: 5, ..first }]
+    }
+
+    fn file(bytes: Vec<u8>) -> WeightsFile {
+        WeightsFile::from_bytes(std::path::Path::new("run/checkpoint.safetensors"), bytes).unwrap()
+    }
+
+    #[test]
+    fn the_gradient_of_a_call_is_that_of_its_loss() {
+        let at = |north_m: f64, east_m: f64| Position { north_m, east_m };
+        let truth = [at(3.0, 4.0), at(9.0, 3.0)];
+        let output = [0.1_f32, 0.3, 0.2, -0.1];
+        // From (1, 1), with the path at (0, 3): the way back is shared between two steps.
+        let wanted = Wanted::new(at(1.0, 1.0), &truth, at(0.0, 3.0), 2);
+        let loss = |output: &[f32]| wanted.loss(output, 20.0, 0.5, &mut [0.0; 4]);
+        // Wanted (2.5, 2) and (6.5, -2); given (2, 6) and (4, -2).
+        assert!((loss(&output) - 0.5 * (0.25 + 16.0 + 6.25)).abs() < 1e-5);
+        let mut gradient = [0.0; 4];
+        wanted.loss(&output, 20.0, 0.5, &mut gradient);
+        for index in 0..4 {
+            let (mut above, mut below) = (output, output);
+            above[index] += 1e-3;
+            below[index] -= 1e-3;
+            let numeric = (loss(&above) - loss(&below)) / f64::from(above[index] - below[index]);
+            assert!((numeric - f64::from(gradient[index])).abs() < 1e-2, "{index}: {numeric} {gradient:?}");
+        }
+    }
+
+    #[test]
+    fn a_path_that_need_not_come_back_wants_the_true_displacements() {
+        let at = |north_m: f64| Position { north_m, east_m: 0.0 };
+        let truth = [at(2.0), at(5.0)];
+        let wanted = Wanted::new(at(1.0), &truth, at(100.0), 0);
+        assert!(wanted.loss(&[1.0, 0.0, 3.0, 0.0], 1.0, 1.0, &mut [0.0; 4]) < 1e-12);
+        let back = Wanted::new(at(1.0), &truth, at(3.0), 1);
+        assert!(back.loss(&[-1.0, 0.0, 3.0, 0.0], 1.0, 1.0, &mut [0.0; 4]) < 1e-12);
+    }
+
+    #[test]
+    fn the_rate_rises_and_falls_once() {
+        let stage = StageConfig { steps: 100, learning_rate: 1.0, ..Default::default() };
+        let rates: Vec<f64> = (0..100).map(|step| stage.learning_rate_at(step)).collect();
+        assert!((rates[0] - 0.04).abs() < 1e-12 && (rates[25] - 1.0).abs() < 1e-12 && rates[99] < 1e-3);
+        assert!(rates[..26].is_sorted() && rates[25..].iter().rev().is_sorted());
+    }
+
+    #[test]
+    fn a_run_stopped_and_resumed_is_the_same_run() {
+        let config = config(7, two_stages());
+        let mut whole = trainer(&config);
+        let mut updates = Vec::new();
+        while let Some(update) = whole.update() {
+            updates.push(update);
+        }
+        assert_eq!(updates.len(), 8);
+        for stop in [3, 6] {
+            let mut first = trainer(&config);
+            (0..stop).for_each(|_| assert!(first.update().is_some()));
+            let bytes = first.checkpoint(&config, None).to_bytes();
+            let mut second = trainer(&config);
+            second.resume(&config, file(bytes)).unwrap();
+            for expected in &updates[stop..] {
+                assert_eq!(second.update().as_ref(), Some(expected));
+            }
+            assert_eq!(second.update(), None);
+            assert_eq!(
+                second.checkpoint(&config, None).to_bytes(),
+                whole.checkpoint(&config, None).to_bytes()
+            );
+        }
+    }
+
+    #[test]
+    fn a_checkpoint_of_another_run_is_refused() {
+        let (mine, other) = (config(1, two_stages()), config(2, two_stages()));
+        let bytes = trainer(&other).checkpoint(&other, None).to_bytes();
+        let error = trainer(&mine).resume(&mine, file(bytes)).unwrap_err();
+        assert!(matches!(error, ModelError::OtherRun { .. }), "{error}");
+        let model = Model::of(&trainer(&mine), &mine, None).to_file().to_bytes();
+        assert!(trainer(&mine).resume(&mine, file(model)).is_err());
+    }
+
+    #[test]
+    fn a_model_survives_its_file() {
+        let config = config(3, two_stages());
+        let model = Model::of(&trainer(&config), &config, None);
+        let back = Model::from_file(file(model.to_file().to_bytes())).unwrap();
+        assert_eq!((&back.config, back.steps), (&config, 0));
+        let segments = source(30).take(5, &mut ChaCha8Rng::seed_from_u64(1));
+        let errors = |model| {
+            quantiles_of(&mut LstmForecaster::new(model, 1), &segments, &EvaluationConfig::default()).unwrap()
+        };
+        assert_eq!(errors(model), errors(back));
+    }
+
+    #[test]
+    fn a_damaged_model_is_refused() {
+        let config = config(3, two_stages());
+        let mut trained = trainer(&config);
+        let model = Model::of(&trained, &config, None);
+        let coastal = ModelConfig { kind: ModelKind::Coastal, ..config.clone() };
+        let lies = Model { config: coastal, ..model }.to_file().to_bytes();
+        let error = Model::from_file(file(lies)).unwrap_err();
+        assert!(matches!(error, ModelError::OtherNetwork { .. }), "{error}");
+        trained.average.update(|weights| weights[0] = f32::NAN);
+        let diverged = Model::of(&trained, &config, None).to_file().to_bytes();
+        assert!(Model::from_file(file(diverged)).is_err());
+        let mut short = Model::of(&trainer(&config), &config, None).to_file().to_bytes();
+        short.truncate(short.len() - 4);
+        assert!(WeightsFile::from_bytes(std::path::Path::new("short"), short).is_err());
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let refused =
+            |training: TrainingConfig| training.check(ModelKind::OpenWater).unwrap_err().to_string();
+        let stage = StageConfig { history_steps: 10, ..Default::default() };
+        let stages = vec![StageConfig::default(), stage];
+        let text = refused(TrainingConfig { stages, ..Default::default() });
+        assert!(text.contains("stages[1].history_steps"), "{text}");
+        assert!(refused(TrainingConfig { stages: vec![], ..Default::default() }).contains("stages"));
+        assert!(
+            refused(TrainingConfig { weight_average: 1.0, ..Default::default() }).contains("weight_average")
+        );
+    }
+
+    /// A few seconds of training already beat the straight line on fresh segments.
+    #[test]
+    fn training_learns_the_weave() {
+        let stage = StageConfig { steps: 300, batch: 32, learning_rate: 5e-3, ..Default::default() };
+        let rollout = StageConfig { steps: 100, calls: 3, learning_rate: 2e-3, ..stage };
+        let mut config = config(1, vec![stage, rollout]);
+        config.training.weight_average = 0.95;
+        let mut trainer = trainer(&config);
+        while trainer.update().is_some() {}
+        let segments = source(4).take(200, &mut ChaCha8Rng::seed_from_u64(99));
+        let mut forecaster = LstmForecaster::new(Model::of(&trainer, &config, None), 1);
+        let evaluation =
+            evaluate(&mut forecaster, &segments, &|_| false, &EvaluationConfig::default()).unwrap();
+        assert!(evaluation.median_ratio < 0.7, "{}", evaluation.median_ratio);
+    }
+}
