@@ -4,15 +4,21 @@
 //! Data flows one way, top to bottom:
 
 pub mod angle;
+pub mod geo;
+pub mod track;
+
+pub mod vessel;
+pub mod world;
+
 pub mod cpa;
 pub mod encounter;
-pub mod episode;
 pub mod forecast;
-pub mod geo;
 pub mod nn;
+
+pub mod policy;
 pub mod scenario;
-pub mod track;
-pub mod vessel;
+
+pub mod episode;
 
 pub mod atomic_file;
 pub mod cli;
