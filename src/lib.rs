@@ -15,15 +15,14 @@ pub mod encounter;
 pub mod forecast;
 pub mod nn;
 
+pub mod env;
 pub mod policy;
+pub mod rl;
 pub mod scenario;
 
 pub mod episode;
+pub mod report;
 
 pub mod atomic_file;
 pub mod cli;
 pub mod config;
-pub mod env;
-pub mod report;
-pub mod rl;
-pub mod world;
