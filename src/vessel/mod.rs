@@ -2,7 +2,7 @@
 //!
 //! A [`Motion`] is known beforehand: its state at any time step, past ones included, follows from
 //! how it was built ([`recorded`], [`linear`], [`waypoints`], [`stochastic`], [`periodic`]). A
-//! [`Steered`] vessel is moved on step by step under orders ([`kinematic`]).
+//! [`Steered`] vessel is moved on step by step under orders ([`kinematic`], [`mmg`]).
 //!
 //! Time steps are `dt_s` apart and step 0 is the start of the scenario; history has negative steps.
 
@@ -13,6 +13,7 @@ use crate::geo::{Position, Velocity};
 
 pub mod kinematic;
 pub mod linear;
+pub mod mmg;
 pub mod offsets;
 pub mod periodic;
 pub mod recorded;
@@ -21,6 +22,7 @@ pub mod waypoints;
 
 pub use kinematic::{Kinematic, KinematicConfig};
 pub use linear::Linear;
+pub use mmg::{MmgConfig, MmgShip};
 pub use offsets::{OffsetProcess, Span, Wandering};
 pub use periodic::PeriodicConfig;
 pub use recorded::Recorded;
