@@ -17,11 +17,11 @@ pub mod nn;
 
 pub mod env;
 pub mod policy;
+pub mod report;
 pub mod rl;
 pub mod scenario;
 
 pub mod episode;
-pub mod report;
 
 pub mod atomic_file;
 pub mod cli;

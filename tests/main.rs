@@ -1,8 +1,10 @@
 //! Integration tests: one binary, one module per subject.
 
 mod architecture;
+mod browser;
 mod cli;
 mod cpa;
 mod forecast_network;
+mod replay;
 mod rl_golden;
 mod rl_learning;
