@@ -5,6 +5,7 @@
 
 pub mod angle;
 pub mod geo;
+pub mod route;
 pub mod track;
 
 pub mod vessel;

@@ -11,11 +11,10 @@ use crate::geo::{Position, Velocity};
 use crate::vessel::Command;
 
 mod hold_course;
-mod route;
 mod rule_based;
 
+pub use crate::route::Route;
 pub use hold_course::HoldCourse;
-pub use route::Route;
 pub use rule_based::{RuleBased, RuleBasedConfig};
 
 /// Own ship at a decision.

@@ -1,8 +1,8 @@
 //! How one vessel moves: one file per kind of motion.
 //!
 //! A [`Motion`] is known beforehand: its state at any time step, past ones included, follows from
-//! how it was built ([`recorded`], [`linear`], [`waypoints`], [`stochastic`], [`periodic`]). A
-//! [`Steered`] vessel is moved on step by step under orders ([`kinematic`], [`mmg`]).
+//! how it was built ([`recorded`], [`linear`], [`waypoints`], [`stochastic`], [`periodic`],
+//! [`piloted`]). A [`Steered`] vessel is moved on step by step under orders ([`kinematic`], [`mmg`]).
 //!
 //! Time steps are `dt_s` apart and step 0 is the start of the scenario; history has negative steps.
 
@@ -16,6 +16,7 @@ pub mod linear;
 pub mod mmg;
 pub mod offsets;
 pub mod periodic;
+pub mod piloted;
 pub mod recorded;
 pub mod stochastic;
 pub mod waypoints;
@@ -25,6 +26,7 @@ pub use linear::Linear;
 pub use mmg::{MmgConfig, MmgShip};
 pub use offsets::{OffsetProcess, Span, Wandering};
 pub use periodic::PeriodicConfig;
+pub use piloted::Piloted;
 pub use recorded::Recorded;
 pub use stochastic::StochasticConfig;
 pub use waypoints::{Waypoint, Waypoints, WaypointsError};

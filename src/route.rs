@@ -1,4 +1,4 @@
-//! Where own ship wants to go: legs between waypoints, the outer ones without end.
+//! Where a vessel wants to go: legs between waypoints, the outer ones without end.
 
 use crate::angle::Nautical;
 use crate::geo::{Displacement, Position};
@@ -40,14 +40,14 @@ impl Route {
     /// Cross-track error of a position, in metres: its distance from the route, positive to **port**.
     #[must_use]
     pub fn cross_track_error_m(&self, position: Position) -> f64 {
-        let (leg, _) = self.nearest(position);
+        let leg = self.legs[self.nearest(position).0];
         -(position - leg.begin).starboard_of_m(leg.course)
     }
 
     /// Course of the route where it is nearest to a position.
     #[must_use]
     pub fn course(&self, position: Position) -> Nautical {
-        self.nearest(position).0.course
+        self.legs[self.nearest(position).0].course
     }
 
     /// The course from a position to the point of the route that lies `lookahead_m` beyond the
@@ -55,8 +55,7 @@ impl Route {
     /// Motion Control, section 12.3).
     #[must_use]
     pub fn course_back(&self, position: Position, lookahead_m: f64) -> Nautical {
-        let (leg, along_m) = self.nearest(position);
-        let mut index = self.legs.iter().position(|other| other == leg).unwrap_or(0);
+        let (mut index, along_m) = self.nearest(position);
         let mut ahead_m = along_m + lookahead_m;
         while ahead_m > self.legs[index].length_m {
             ahead_m -= self.legs[index].length_m;
@@ -66,10 +65,10 @@ impl Route {
         (leg.begin + Displacement::towards(leg.course, ahead_m) - position).bearing()
     }
 
-    /// The nearest leg and how far along it the foot of the perpendicular lies. Only the first leg
+    /// Index of the nearest leg and how far along it the foot of the perpendicular lies. Only the first leg
     /// reaches back beyond its beginning.
-    fn nearest(&self, position: Position) -> (&Leg, f64) {
-        let mut nearest = (&self.legs[0], 0.0);
+    fn nearest(&self, position: Position) -> (usize, f64) {
+        let mut nearest = (0, 0.0);
         let mut least_m = f64::INFINITY;
         for (index, leg) in self.legs.iter().enumerate() {
             let from_begin = position - leg.begin;
@@ -77,7 +76,7 @@ impl Route {
             let along_m = from_begin.along_m(leg.course).clamp(floor_m, leg.length_m);
             let distance_m = (from_begin + -Displacement::towards(leg.course, along_m)).length_m();
             if distance_m < least_m {
-                (nearest, least_m) = ((leg, along_m), distance_m);
+                (nearest, least_m) = ((index, along_m), distance_m);
             }
         }
         nearest
