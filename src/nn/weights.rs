@@ -7,24 +7,27 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use super::{Layout, Parameters, Real};
+use crate::atomic_file;
 
 /// Why weights could not be saved or loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum WeightsError {
-    /// The file could not be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
+    /// The file could not be read.
+    #[error("cannot read {} ({source}): check the path and its permissions", path.display())]
+    Read {
         /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
     },
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] atomic_file::WriteError),
     /// The bytes are not a whole safetensors file.
     #[error("{}: not a safetensors file, or a truncated one ({reason}); copy or download it again", path.display())]
     Malformed {
@@ -144,13 +147,7 @@ impl WeightsWriter {
 
     /// Writes the file. It appears whole or not at all.
     pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
-        let io = |source| WeightsError::Io { path: path.to_owned(), source };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
-        file.write_all(&self.to_bytes()).map_err(io)?;
-        file.as_file().sync_all().map_err(io)?;
-        file.persist(path).map_err(|e| io(e.error))?;
-        Ok(())
+        Ok(atomic_file::write(path, |file| file.write_all(&self.to_bytes()))?)
     }
 }
 
@@ -188,7 +185,7 @@ impl WeightsFile {
     /// Reads and checks the file as a whole.
     pub fn open(path: &Path) -> Result<Self, WeightsError> {
         let bytes =
-            std::fs::read(path).map_err(|source| WeightsError::Io { path: path.to_owned(), source })?;
+            std::fs::read(path).map_err(|source| WeightsError::Read { path: path.to_owned(), source })?;
         Self::from_bytes(path, bytes)
     }
 
@@ -402,8 +399,12 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_cannot_be_written_is_an_error() {
-        let error = WeightsWriter::new().save(Path::new("no/such/folder/net.safetensors")).unwrap_err();
-        assert!(error.to_string().contains("no/such/folder"), "{error}");
+    fn paths_that_cannot_be_read_or_written_are_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let below_a_file = file.path().join("net.safetensors");
+        let written = WeightsWriter::new().save(&below_a_file).unwrap_err().to_string();
+        let read = WeightsFile::open(&below_a_file).unwrap_err().to_string();
+        assert!(written.contains("net.safetensors"), "{written}");
+        assert!(read.contains("net.safetensors"), "{read}");
     }
 }
