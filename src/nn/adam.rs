@@ -77,7 +77,7 @@ impl<T: Real> Adam<T> {
         };
         let isa = compute.isa();
         let (first, second) = (Shared::new(&mut self.first), Shared::new(&mut self.second));
-        parameters.update(|values| {
+        parameters.update_with(compute, |compute, values| {
             let (count, weights) = (values.len(), Shared::new(values));
             compute.split(count, GRAIN, count * OPERATIONS, &|part| {
                 // SAFETY: parts are disjoint.

@@ -36,6 +36,7 @@ mod simd;
 #[cfg(test)]
 mod testing;
 mod threads;
+mod transpose;
 pub mod weights;
 
 pub use activation::Activation;

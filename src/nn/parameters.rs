@@ -5,7 +5,9 @@ use std::sync::Arc;
 use rand::{Rng, RngExt};
 
 use super::elementwise::{Accumulate, Blend};
-use super::layout::{PANEL, Place, padded};
+use super::layout::{PANEL, Place};
+use super::matmul::Shared;
+use super::transpose::Transpose;
 use super::{Buffer, Compute, Layout, Real};
 
 /// The weights of one network.
@@ -62,10 +64,23 @@ impl<T: Real> Parameters<T> {
 
     /// Changes the flat vector and brings the transposed copies up to date.
     pub fn update<R>(&mut self, change: impl FnOnce(&mut [T]) -> R) -> R {
-        let result = change(&mut self.values);
+        self.update_with(&mut Compute::new(1), |_, values| change(values))
+    }
+
+    /// The same on the given threads.
+    pub fn update_with<R>(
+        &mut self,
+        compute: &mut Compute,
+        change: impl FnOnce(&mut Compute, &mut [T]) -> R,
+    ) -> R {
+        let result = change(compute, &mut self.values);
         if let Some(transposed) = &mut self.transposed {
+            let isa = compute.isa();
+            let (values, transposed) = (&self.values[..], Shared::new(transposed));
             for place in self.layout.matrices() {
-                transpose(&self.values, transposed, place, 0..place.padded_outputs() / PANEL);
+                compute.split(place.padded_outputs() / PANEL, 1, place.len(), &|panels| {
+                    T::dispatch(isa, Transpose { place, panels, values, transposed });
+                });
             }
         }
         result
@@ -80,9 +95,9 @@ impl<T: Real> Parameters<T> {
     /// `self += rate (other - self)`: a target network follows (`polyak = 1 - rate`).
     pub fn follow(&mut self, compute: &mut Compute, other: &Self, rate: f64) {
         assert_eq!(self.values.len(), other.values.len());
-        let isa = compute.isa();
-        self.update(|values| {
-            T::dispatch(isa, Blend { target: values, source: &other.values, rate: T::from_f64(rate) });
+        self.update_with(compute, |compute, values| {
+            let blend = Blend { target: values, source: &other.values, rate: T::from_f64(rate) };
+            T::dispatch(compute.isa(), blend);
         });
     }
 
@@ -153,23 +168,69 @@ impl<T: Real> Gradients<T> {
     }
 }
 
-/// Copies the given panels of a matrix, block by block of 32 x 32, into its transposed copy.
-fn transpose<T: Real>(values: &[T], transposed: &mut [T], place: Place, panels: std::ops::Range<usize>) {
-    let source = &values[place.offset..place.offset + place.len()];
-    let target = &mut transposed[place.transposed..place.transposed + place.transposed_len()];
-    let outputs = place.padded_outputs();
-    for panel in panels {
-        for block in 0..padded(place.inputs) / PANEL {
-            let width = (place.inputs - block * PANEL).min(PANEL);
-            let from = (panel * place.inputs + block * PANEL) * PANEL;
-            let to = (block * outputs + panel * PANEL) * PANEL;
-            let source = &source[from..from + width * PANEL];
-            let target = &mut target[to..to + PANEL * PANEL];
-            for (output, row) in target.chunks_exact_mut(PANEL).enumerate() {
-                for (input, element) in row[..width].iter_mut().enumerate() {
-                    *element = source[input * PANEL + output];
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::nn::layout::padded;
+    use crate::nn::{Activation, Dense, Isa, Lstm};
+
+    fn network() -> Arc<Layout> {
+        let mut layout = Layout::new();
+        Lstm::new(&mut layout, "lstm", 43, 40);
+        Dense::new(&mut layout, "wide", 258, 256, Activation::Relu);
+        Dense::new(&mut layout, "small", 3, 2, Activation::Relu);
+        Arc::new(layout)
+    }
+
+    #[test]
+    fn transposed_copies_follow_every_update_on_every_instruction_set() {
+        let layout = network();
+        let first = Parameters::<f32>::initialised(&layout, &mut ChaCha8Rng::seed_from_u64(1));
+        for isa in Isa::available() {
+            let mut parameters = Parameters::zeros(&layout, true);
+            let mut compute = Compute::with_isa(isa, 2).unwrap();
+            parameters.update_with(&mut compute, |_, values| values.copy_from_slice(&first.values));
+            for place in layout.matrices() {
+                let (plain, transposed) = (parameters.at(place), parameters.transposed_at(place));
+                let outputs = place.padded_outputs();
+                for output in 0..outputs {
+                    for input in 0..padded(place.inputs) {
+                        let at = (output / PANEL * place.inputs + input) * PANEL + output % PANEL;
+                        let expected = if input < place.inputs { plain[at] } else { 0.0 };
+                        let at = (input / PANEL * outputs + output) * PANEL + input % PANEL;
+                        assert_eq!(transposed[at], expected, "{isa:?} output {output} input {input}");
+                    }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_target_network_follows_and_copies() {
+        let layout = network();
+        let online = Parameters::<f64>::initialised(&layout, &mut ChaCha8Rng::seed_from_u64(2));
+        let mut target = Parameters::zeros(&layout, false);
+        target.follow(&mut Compute::new(1), &online, 0.25);
+        let tensor = |p: &Parameters<f64>| p.tensor("wide.weight").unwrap();
+        assert!(tensor(&target).iter().zip(tensor(&online)).all(|(t, o)| (t - 0.25 * o).abs() < 1e-16));
+        target.copy_from(&online);
+        assert_eq!(tensor(&target), tensor(&online));
+    }
+
+    #[test]
+    fn initial_weights_are_pytorchs_uniform() {
+        let layout = network();
+        let parameters = Parameters::<f64>::initialised(&layout, &mut ChaCha8Rng::seed_from_u64(3));
+        for (name, bound) in [("lstm.weight_ih_l0", 40f64), ("lstm.bias_hh_l0", 40.0), ("wide.weight", 258.0)]
+        {
+            let (bound, values) = (bound.sqrt().recip(), parameters.tensor(name).unwrap());
+            let largest = values.iter().fold(0.0f64, |a, x| a.max(x.abs()));
+            assert!(largest <= bound && largest > 0.95 * bound, "{name}");
+            let mean_square = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
+            assert!((mean_square / (bound * bound / 3.0) - 1.0).abs() < 0.15, "{name}");
         }
     }
 }

@@ -36,7 +36,8 @@ unsafe impl Send for Shared {}
 
 /// A team of threads: the caller's own and `count - 1` workers that live as long as this value.
 pub struct Threads {
-    shared: Arc<Shared>,
+    /// What the workers see; `None` if there are none, so that a team of one is free.
+    shared: Option<Arc<Shared>>,
     workers: Vec<(Thread, Option<JoinHandle<()>>)>,
 }
 
@@ -44,6 +45,9 @@ impl Threads {
     /// A team of `count` threads, at least one.
     pub fn new(count: usize) -> Self {
         let extra = count.max(1) - 1;
+        if extra == 0 {
+            return Self { shared: None, workers: Vec::new() };
+        }
         let shared = Arc::new(Shared {
             round: AtomicU32::new(0),
             work: UnsafeCell::new(None),
@@ -59,7 +63,7 @@ impl Threads {
                 (handle.thread().clone(), Some(handle))
             })
             .collect();
-        Self { shared, workers }
+        Self { shared: Some(shared), workers }
     }
 
     /// How many threads there are, the caller's included.
@@ -70,33 +74,34 @@ impl Threads {
     /// Calls `work(i)` once for every `i` below [`count`](Self::count), each on its own thread, and returns
     /// when all are done. A panic in any of them is raised again here.
     pub fn run(&mut self, work: &(dyn Fn(usize) + Sync)) {
-        if self.workers.is_empty() {
-            return work(0);
-        }
+        let Some(shared) = &self.shared else { return work(0) };
         // SAFETY: only the lifetime is erased; this function does not return, nor unwind, before every worker
         // has finished with the reference.
         let erased: Work = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Work>(work) };
         // SAFETY: no worker runs: `unfinished` was zero when the last round returned, and `&mut self` keeps
         // other callers out.
-        unsafe { *self.shared.work.get() = Some(erased) };
-        self.shared.unfinished.store(self.workers.len(), Ordering::Relaxed);
-        self.shared.round.fetch_add(1, Ordering::SeqCst);
-        for ((thread, _), asleep) in self.workers.iter().zip(&self.shared.asleep) {
+        unsafe { *shared.work.get() = Some(erased) };
+        shared.unfinished.store(self.workers.len(), Ordering::Relaxed);
+        shared.round.fetch_add(1, Ordering::SeqCst);
+        for ((thread, _), asleep) in self.workers.iter().zip(&shared.asleep) {
             if asleep.load(Ordering::SeqCst) {
                 thread.unpark();
             }
         }
         let own = catch_unwind(AssertUnwindSafe(|| work(0)));
-        self.wait();
+        shared.wait();
         if let Err(panic) = own {
             resume_unwind(panic);
         }
-        assert!(!self.shared.panicked.swap(false, Ordering::Relaxed), "a worker thread panicked");
+        assert!(!shared.panicked.swap(false, Ordering::Relaxed), "a worker thread panicked");
     }
+}
 
+impl Shared {
+    /// Returns when every worker has finished.
     fn wait(&self) {
         let mut spins = 0;
-        while self.shared.unfinished.load(Ordering::Acquire) > 0 {
+        while self.unfinished.load(Ordering::Acquire) > 0 {
             spins += 1;
             if spins < SPINS_BEFORE_YIELDING {
                 std::hint::spin_loop();
@@ -109,8 +114,9 @@ impl Threads {
 
 impl Drop for Threads {
     fn drop(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.round.fetch_add(1, Ordering::SeqCst);
+        let Some(shared) = &self.shared else { return };
+        shared.stop.store(true, Ordering::Relaxed);
+        shared.round.fetch_add(1, Ordering::SeqCst);
         for (thread, handle) in &mut self.workers {
             thread.unpark();
             if let Some(handle) = handle.take() {

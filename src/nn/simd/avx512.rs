@@ -108,4 +108,54 @@ impl Simd for Avx512 {
     fn tanh(self, a: __m512) -> __m512 {
         tanh::rational(self, a)
     }
+    #[inline(always)]
+    unsafe fn transpose(self, source: *const f32, count: usize, target: *mut f32, stride: usize) {
+        unsafe {
+            let mut rows = [_mm512_setzero_ps(); 16];
+            for (i, row) in rows.iter_mut().enumerate().take(count) {
+                *row = _mm512_loadu_ps(source.add(i * stride));
+            }
+            for (j, column) in transposed(rows).into_iter().enumerate() {
+                _mm512_storeu_ps(target.add(j * stride), column);
+            }
+        }
+    }
+}
+
+/// Transposes 16 x 16: first within the 128-bit lanes, then the lanes.
+///
+/// # Safety
+/// AVX-512F must exist.
+#[inline(always)]
+unsafe fn transposed(rows: [__m512; 16]) -> [__m512; 16] {
+    let mut pairs = rows;
+    let mut quads = rows;
+    let mut halves = rows;
+    let mut columns = rows;
+    // SAFETY: by the caller's contract.
+    unsafe {
+        for i in (0..16).step_by(2) {
+            pairs[i] = _mm512_unpacklo_ps(rows[i], rows[i + 1]);
+            pairs[i + 1] = _mm512_unpackhi_ps(rows[i], rows[i + 1]);
+        }
+        for i in (0..16).step_by(4) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|j| _mm512_castps_pd(pairs[i + j]));
+            quads[i] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, c));
+            quads[i + 1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, c));
+            quads[i + 2] = _mm512_castpd_ps(_mm512_unpacklo_pd(b, d));
+            quads[i + 3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
+        }
+        // Lane l of quads[4 g + j] holds column 4 l + j of rows 4 g to 4 g + 3.
+        for j in 0..4 {
+            for half in [0, 8] {
+                halves[half + j] = _mm512_shuffle_f32x4::<0x88>(quads[half + j], quads[half + 4 + j]);
+                halves[half + 4 + j] = _mm512_shuffle_f32x4::<0xdd>(quads[half + j], quads[half + 4 + j]);
+            }
+        }
+        for j in 0..8 {
+            columns[j] = _mm512_shuffle_f32x4::<0x88>(halves[j], halves[8 + j]);
+            columns[8 + j] = _mm512_shuffle_f32x4::<0xdd>(halves[j], halves[8 + j]);
+        }
+    }
+    columns
 }

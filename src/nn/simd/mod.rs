@@ -105,6 +105,30 @@ pub trait Simd: Copy {
     /// Hyperbolic tangent. In f32 within 5e-7 of the true value, relative; in f64 the standard library's.
     fn tanh(self, a: Self::Vector) -> Self::Vector;
 
+    /// Writes `target[j][i] = source[i][j]` for `i` and `j` below `LANES`, rows `stride` apart in both; source
+    /// rows from `count <= LANES` on count as zero.
+    ///
+    /// # Safety
+    /// `source` must be valid for reads of `count` rows and `target` for writes of `LANES` rows.
+    #[inline(always)]
+    unsafe fn transpose(
+        self,
+        source: *const Self::Scalar,
+        count: usize,
+        target: *mut Self::Scalar,
+        stride: usize,
+    ) {
+        for i in 0..Self::LANES {
+            for j in 0..Self::LANES {
+                // SAFETY: by the caller's contract.
+                unsafe {
+                    let element = if i < count { *source.add(i * stride + j) } else { Self::Scalar::ZERO };
+                    *target.add(j * stride + i) = element;
+                }
+            }
+        }
+    }
+
     /// Logistic function `1 / (1 + exp(-a))`, as `(1 + tanh(a / 2)) / 2`.
     #[inline(always)]
     fn sigmoid(self, a: Self::Vector) -> Self::Vector {
