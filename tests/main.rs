@@ -5,6 +5,7 @@ mod browser;
 mod cli;
 mod cpa;
 mod forecast_network;
+mod nn_allocation;
 mod replay;
 mod rl_golden;
 mod rl_learning;
