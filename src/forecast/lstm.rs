@@ -95,3 +95,87 @@ impl Forecaster for LstmForecaster {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::dataset::{Process, SyntheticConfig, SyntheticSegments};
+    use super::super::{DataConfig, ModelConfig, ModelKind, Trainer, TrainingConfig};
+    use super::*;
+    use crate::vessel::StochasticConfig;
+
+    const MISSING: Position = Position { north_m: f64::NAN, east_m: f64::NAN };
+
+    fn forecaster(kind: ModelKind) -> LstmForecaster {
+        let process = Process::Stochastic(StochasticConfig::default());
+        let segments = SyntheticConfig::default();
+        let source = SyntheticSegments { process, config: segments, history_len: 1, horizon: 0 };
+        let config = ModelConfig {
+            name: "untrained".into(),
+            kind,
+            data: DataConfig::Synthetic { process, segments },
+            training: TrainingConfig::default(),
+        };
+        let trainer = Trainer::new(kind, config.training.clone(), Box::new(source), 1).unwrap();
+        LstmForecaster::new(Model::of(&trainer, &config, None), 1)
+    }
+
+    fn way(length: usize, turn: f64) -> Vec<Position> {
+        (0..length).map(|k| Position { north_m: 40.0 * k as f64, east_m: turn * (k * k) as f64 }).collect()
+    }
+
+    #[test]
+    fn histories_that_do_not_serve_the_model_are_answered_by_a_line_beside_the_others() {
+        for kind in [ModelKind::OpenWater, ModelKind::Coastal] {
+            let mut forecaster = forecaster(kind);
+            let length = forecaster.history_len();
+            let (complete, short) = (way(length + 3, 0.1), way(length - 1, 0.0));
+            let mut gap = way(length, 0.0);
+            gap[length / 2] = MISSING;
+            let mut forecasts = Forecasts::new();
+            forecaster.forecast(&[&gap, &complete, &short], 30, &mut forecasts).unwrap();
+            let bases: Vec<Basis> = (0..3).map(|path| forecasts.basis(path)).collect();
+            assert_eq!(bases, [Basis::Gap, Basis::Model, Basis::TooShort]);
+            let straight = Position { north_m: 40.0 * (length as f64 + 29.0), east_m: 0.0 };
+            assert!(forecasts.path(0)[29].distance_m(straight) < 1e-6);
+
+            let mut alone = Forecasts::new();
+            forecaster.forecast(&[&complete], 30, &mut alone).unwrap();
+            assert_eq!(alone.path(0), forecasts.path(1));
+        }
+    }
+
+    #[test]
+    fn a_history_without_velocity_is_an_error() {
+        let error = forecaster(ModelKind::OpenWater)
+            .forecast(&[&way(10, 0.0), &[MISSING; 10]], 5, &mut Forecasts::new())
+            .unwrap_err();
+        assert_eq!(error, ForecastError::NoVelocity { history: 1, finite: 0, window: 10 });
+    }
+
+    #[test]
+    fn a_shorter_horizon_gives_the_beginning_of_a_longer_one() {
+        let mut forecaster = forecaster(ModelKind::Coastal);
+        let history = way(75, 0.05);
+        let (mut long, mut short) = (Forecasts::new(), Forecasts::new());
+        forecaster.forecast(&[&history], 30, &mut long).unwrap();
+        forecaster.forecast(&[&history], 13, &mut short).unwrap();
+        assert_eq!(short.path(0), &long.path(0)[..13]);
+        forecaster.forecast(&[&history], 0, &mut short).unwrap();
+        assert!(short.path(0).is_empty());
+    }
+
+    /// Coastal forecasts depend on where the vessel is, those of open water do not.
+    #[test]
+    fn only_the_coastal_forecaster_is_anchored() {
+        for (kind, anchored) in [(ModelKind::OpenWater, false), (ModelKind::Coastal, true)] {
+            let mut forecaster = forecaster(kind);
+            let here = way(75, 0.05);
+            let shift = crate::geo::Displacement { north_m: 4096.0, east_m: -8192.0 };
+            let there: Vec<Position> = here.iter().map(|&position| position + shift).collect();
+            let mut forecasts = Forecasts::new();
+            forecaster.forecast(&[&here, &there], 20, &mut forecasts).unwrap();
+            let apart = (forecasts.path(0)[19] + shift).distance_m(forecasts.path(1)[19]);
+            assert_eq!(apart > 0.01, anchored, "{apart}");
+        }
+    }
+}

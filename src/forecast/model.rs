@@ -71,6 +71,9 @@ pub enum DataConfig {
         area: String,
         /// The AIS files.
         files: Vec<String>,
+        /// Time between two positions, in seconds.
+        #[serde(default = "default_dt_s")]
+        dt_s: f64,
         /// What trains and what is held out.
         #[serde(default)]
         split: SplitConfig,
@@ -78,6 +81,10 @@ pub enum DataConfig {
         #[serde(default)]
         segments: RecordedConfig,
     },
+}
+
+fn default_dt_s() -> f64 {
+    SyntheticConfig::default().dt_s
 }
 
 /// What a forecaster is and what it was trained on.
@@ -96,6 +103,15 @@ pub struct ModelConfig {
 }
 
 impl ModelConfig {
+    /// Time between two positions, in seconds.
+    #[must_use]
+    pub fn dt_s(&self) -> f64 {
+        match &self.data {
+            DataConfig::Synthetic { segments, .. } => segments.dt_s,
+            DataConfig::Recorded { dt_s, .. } => *dt_s,
+        }
+    }
+
     pub(super) fn encoding(&self) -> Encoding {
         Encoding {
             history_len: self.kind.history_len(),
@@ -143,6 +159,12 @@ pub enum ModelError {
          (see the `config.toml` beside it) or start in another folder"
     )]
     OtherRun {
+        /// The file.
+        path: String,
+    },
+    /// A model that cannot be trained on.
+    #[error("{path}: cannot be trained on here: its kind or its `scaling` is another; configure the same")]
+    OtherStart {
         /// The file.
         path: String,
     },
@@ -194,6 +216,22 @@ impl Model {
 }
 
 impl Trainer {
+    /// Begins with the weights of a model instead of random ones; the optimiser begins anew.
+    ///
+    /// # Errors
+    ///
+    /// When the model is of another kind or has other scales.
+    pub fn start_from(&mut self, path: &str, model: &Model) -> Result<(), ModelError> {
+        let fits = model.network.config() == self.network.config()
+            && model.config.training.scaling == self.config.scaling;
+        if !fits {
+            return Err(ModelError::OtherStart { path: path.to_owned() });
+        }
+        self.network.parameters.copy_from(&model.network.parameters);
+        self.average.copy_from(&model.network.parameters);
+        Ok(())
+    }
+
     /// Everything needed to go on exactly from here.
     #[must_use]
     pub fn checkpoint(&self, config: &ModelConfig, origin: Option<Geodetic>) -> WeightsWriter {

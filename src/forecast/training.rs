@@ -84,6 +84,8 @@ impl StageConfig {
 pub struct TrainingConfig {
     /// Seed of the initial weights and of the stream of segments.
     pub seed: u64,
+    /// A model whose weights the run begins with, instead of random ones.
+    pub start_from: Option<String>,
     /// Scales of inputs and outputs.
     pub scaling: Scaling,
     /// The weights used are a running mean of the trained ones; this is how much of it stays at each update.
@@ -102,6 +104,7 @@ impl Default for TrainingConfig {
     fn default() -> Self {
         Self {
             seed: 1,
+            start_from: None,
             scaling: Scaling::default(),
             weight_average: 0.998,
             max_gradient_norm: 10.0,
@@ -558,6 +561,22 @@ mod tests {
             quantiles_of(&mut LstmForecaster::new(model, 1), &segments, &EvaluationConfig::default()).unwrap()
         };
         assert_eq!(errors(model), errors(back));
+    }
+
+    #[test]
+    fn a_run_can_begin_with_the_weights_of_a_model() {
+        let config = config(3, two_stages());
+        let mut first = trainer(&config);
+        while first.update().is_some() {}
+        let model = Model::of(&first, &config, None);
+        let mut second = trainer(&config);
+        second.start_from("model", &model).unwrap();
+        assert_eq!((second.step(), second.weights().values()), (0, first.weights().values()));
+        assert!(second.update().is_some());
+        let mut scaled = config.clone();
+        scaled.training.scaling.step_m = 7.0;
+        let error = trainer(&scaled).start_from("model", &model).unwrap_err();
+        assert!(matches!(error, ModelError::OtherStart { .. }), "{error}");
     }
 
     #[test]

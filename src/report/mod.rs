@@ -3,6 +3,7 @@
 
 pub mod episode_files;
 pub mod event_file;
+pub mod figure;
 pub mod replay;
 
 use std::path::{Path, PathBuf};
