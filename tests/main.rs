@@ -9,3 +9,4 @@ mod nn_allocation;
 mod replay;
 mod rl_golden;
 mod rl_learning;
+mod vessel;

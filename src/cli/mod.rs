@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub mod progress;
 pub mod table;
+pub mod vessel;
 
 #[derive(Debug, Parser)]
 #[command(name = "searoom", version, about, long_about = LONG_ABOUT, after_help = EXAMPLES)]
@@ -44,7 +45,10 @@ macro_rules! subcommands {
 
 // Every module named here has `pub struct Args`, a `clap::Args`, and
 // `pub fn run(Args, &mut dyn Write) -> anyhow::Result<()>`.
-subcommands! {}
+subcommands! {
+    /// Standard manoeuvres of a ship with real dynamics
+    Vessel(vessel),
+}
 
 /// Runs the program on a command line, its name first, and returns the exit code.
 pub fn run(command_line: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {

@@ -5,8 +5,10 @@
 //! running model tests of SIMMAN 2008 (MARIN), evaluated anew. All at full scale, deep water, an
 //! approach speed of 15.5 knots, lengths over `L_pp`.
 
+use serde::Serialize;
+
 /// Turning indices at 35 degrees of rudder.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PublishedTurn {
     /// Advance over length, calculated by the authors of the method.
     pub advance_calculated: f64,
