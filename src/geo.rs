@@ -24,6 +24,9 @@ pub const M_PER_NMI: f64 = 1852.0;
 /// Brings a longitude in degrees to `[-180, 180)`.
 #[must_use]
 pub fn wrap_longitude_deg(longitude_deg: f64) -> f64 {
+    if (-180.0..180.0).contains(&longitude_deg) {
+        return longitude_deg;
+    }
     let wrapped = (longitude_deg + 180.0).rem_euclid(360.0) - 180.0;
     if wrapped >= 180.0 { -180.0 } else { wrapped }
 }

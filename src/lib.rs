@@ -3,6 +3,7 @@
 //!
 //! Data flows one way, top to bottom:
 
+pub mod ais;
 pub mod angle;
 pub mod geo;
 pub mod route;

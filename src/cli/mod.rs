@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub mod ais;
 pub mod progress;
 pub mod table;
 pub mod vessel;
@@ -35,7 +36,6 @@ macro_rules! subcommands {
         enum Command { $($(#[$doc])* $name($module::Args)),* }
 
         impl Command {
-            #[allow(unused_variables)]
             fn run(self, out: &mut dyn Write) -> anyhow::Result<()> {
                 match self { $(Self::$name(args) => $module::run(args, out)),* }
             }
@@ -46,6 +46,8 @@ macro_rules! subcommands {
 // Every module named here has `pub struct Args`, a `clap::Args`, and
 // `pub fn run(Args, &mut dyn Write) -> anyhow::Result<()>`.
 subcommands! {
+    /// Import recorded traffic, look at its tracks, draw them
+    Ais(ais),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
 }
