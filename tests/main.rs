@@ -9,4 +9,5 @@ mod nn_allocation;
 mod replay;
 mod rl_golden;
 mod rl_learning;
+mod scenario;
 mod vessel;

@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub mod ais;
 pub mod progress;
+pub mod scenario;
 pub mod table;
 pub mod vessel;
 
@@ -48,6 +49,8 @@ macro_rules! subcommands {
 subcommands! {
     /// Import recorded traffic, look at its tracks, draw them
     Ais(ais),
+    /// List, check and run scripted encounters
+    Scenario(scenario),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
 }

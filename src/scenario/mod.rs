@@ -1,3 +1,24 @@
-//! Scripted encounters.
+//! Scripted encounters: from a TOML file or a Rust program to ships that move.
+//!
+//! A [`ScenarioFile`] is parsed and checked key by key; whatever is wrong is an error that names
+//! file, line and key and says what to write instead. A [`Scenario`] is the same without a file, for
+//! programs. Recorded tracks are looked up, targets are placed relative to own ship
+//! ([`placement`]), and the starts of the paper's head-on encounters are found on recorded tracks
+//! ([`encounter_starts`]).
 
 pub mod encounter_starts;
+mod file;
+mod model;
+mod moment;
+mod parse;
+pub mod placement;
+mod run;
+mod section;
+mod setup;
+pub mod streams;
+mod tracks;
+
+pub use file::ScenarioFile;
+pub use model::*;
+pub use section::Fault;
+pub use setup::{PlacedTarget, StagedEncounter};

@@ -1,0 +1,266 @@
+//! `searoom scenario`: scripted encounters, listed, checked and run.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::Subcommand;
+use serde::Serialize;
+
+use super::table::table;
+use crate::episode::{Episode, TargetSummary};
+use crate::geo::M_PER_NMI;
+use crate::policy;
+use crate::report::{self, EpisodeFiles};
+use crate::scenario::{ScenarioFile, StagedEncounter};
+
+/// The scenario commands.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// List the scenarios of a directory
+    List {
+        /// Directory of scenario files, searched with its subdirectories
+        #[arg(default_value = "scenarios")]
+        directory: PathBuf,
+    },
+    /// Check scenario files: keys, units, geometry, and that recorded tracks are there
+    Check {
+        /// Scenario files
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Run a scenario; print what came of it and write a replay
+    #[command(after_help = "Examples:\n  \
+        searoom scenario run scenarios/head_on.toml\n  \
+        searoom scenario run scenarios/head_on.toml --policy rule-based --out out/rule-based\n  \
+        searoom scenario run scenarios/head_on_curve.toml --seed 7 --json")]
+    Run(RunArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct RunArgs {
+    /// Scenario file
+    file: PathBuf,
+    /// Who steers own ship, instead of the policy the file names
+    #[arg(long, value_parser = policy::NAMES)]
+    policy: Option<String>,
+    /// Seed of everything random, instead of the file's
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Directory for episode.csv, episode.jsonl and index.html [default: out/NAME]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Print the outcome as JSON instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Files that cannot be read or written, scenarios that cannot be.
+pub fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
+    match args.command {
+        Command::List { directory } => list(&directory, out),
+        Command::Check { files } => check(&files, out),
+        Command::Run(args) => run_scenario(&args, out),
+    }
+}
+
+fn list(directory: &Path, out: &mut dyn Write) -> anyhow::Result<()> {
+    let files = scenario_files(directory).with_context(|| {
+        format!("{}: cannot be listed; name a directory of scenarios", directory.display())
+    })?;
+    if files.is_empty() {
+        bail!("{}: holds no scenario files (*.toml); name another directory", directory.display());
+    }
+    let mut rows = table(2, &["file", "title", "targets", "duration"]);
+    for file in files {
+        match ScenarioFile::load(&file) {
+            Ok(ScenarioFile { scenario, .. }) => rows.add_row([
+                file.display().to_string(),
+                scenario.title,
+                scenario.targets.len().to_string(),
+                format!("{} s", scenario.duration_s),
+            ]),
+            Err(error) => rows.add_row([file.display().to_string(), format!("cannot be read: {error}")]),
+        };
+    }
+    writeln!(out, "{rows}")?;
+    Ok(())
+}
+
+/// The TOML files under a directory, sorted by path.
+fn scenario_files(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(directory)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            files.extend(scenario_files(&path)?);
+        } else if path.extension().is_some_and(|extension| extension == "toml") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn check(files: &[PathBuf], out: &mut dyn Write) -> anyhow::Result<()> {
+    let mut faulty = 0;
+    for file in files {
+        match ScenarioFile::load(file).and_then(|scenario| scenario.set_up()) {
+            Ok(staged) => writeln!(out, "{}: {}", file.display(), described(&staged))?,
+            Err(error) => {
+                faulty += 1;
+                writeln!(out, "{error}")?;
+            }
+        }
+    }
+    match faulty {
+        0 => Ok(()),
+        1 => bail!("one scenario cannot be used, see above"),
+        _ => bail!("{faulty} scenarios cannot be used, see above"),
+    }
+}
+
+/// The staged at the start in a line.
+fn described(staged: &StagedEncounter) -> String {
+    let targets = staged
+        .targets
+        .iter()
+        .map(|target| {
+            let range_m = target.motion.position(0).distance_m(staged.own_start.position);
+            format!("{} {:.2} nmi off", target.name, range_m / M_PER_NMI)
+        })
+        .collect::<Vec<_>>();
+    let steps = staged.scenario.steps();
+    if targets.is_empty() {
+        format!("fits, {steps} steps, no targets")
+    } else {
+        format!("fits, {steps} steps, {}", targets.join(", "))
+    }
+}
+
+fn run_scenario(args: &RunArgs, out: &mut dyn Write) -> anyhow::Result<()> {
+    let mut file = ScenarioFile::load(&args.file)?;
+    if let Some(policy) = &args.policy {
+        file.scenario.policy.clone_from(policy);
+    }
+    if let Some(seed) = args.seed {
+        file.scenario.seed = seed;
+    }
+    let staged = file.set_up()?;
+    let episode = staged.run();
+    let directory = args.out.clone().unwrap_or_else(|| Path::new("out").join(&file.scenario.name));
+    let files = report::write_episode(&episode, &directory)?;
+    let outcome = Outcome::of(&episode, files);
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&outcome)?)?;
+    } else {
+        outcome.print(&file.scenario.title, out)?;
+    }
+    Ok(())
+}
+
+/// What came of a run, as `--json` prints it.
+#[derive(Debug, Serialize)]
+struct Outcome {
+    scenario: String,
+    policy: String,
+    seed: u64,
+    duration_s: f64,
+    contact: bool,
+    targets: Vec<TargetOutcome>,
+    files: Files,
+}
+
+#[derive(Debug, Serialize)]
+struct TargetOutcome {
+    name: String,
+    dcpa_at_start_m: f64,
+    tcpa_at_start_s: f64,
+    closest_m: f64,
+    closest_at_s: f64,
+    closest_hulls_m: f64,
+    contact_distance_m: f64,
+    circle_contacts: usize,
+    first_circle_contact_s: Option<f64>,
+    first_hull_contact_s: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Files {
+    csv: PathBuf,
+    jsonl: PathBuf,
+    html: PathBuf,
+}
+
+impl Outcome {
+    fn of(episode: &Episode, files: EpisodeFiles) -> Self {
+        Self {
+            scenario: episode.scenario.clone(),
+            policy: episode.policy.clone(),
+            seed: episode.seed,
+            duration_s: episode.duration_s(),
+            contact: episode.has_contact(),
+            targets: episode.summaries().into_iter().map(TargetOutcome::from).collect(),
+            files: Files { csv: files.csv, jsonl: files.jsonl, html: files.html },
+        }
+    }
+
+    fn print(&self, title: &str, out: &mut dyn Write) -> anyhow::Result<()> {
+        writeln!(out, "{title}")?;
+        writeln!(out, "{}, seed {}, {:.0} s", self.policy, self.seed, self.duration_s)?;
+        let headings =
+            ["target", "DCPA at start", "TCPA at start", "closest", "at", "hulls", "contact of circles"];
+        let mut rows = table(1, &headings);
+        for target in &self.targets {
+            rows.add_row([
+                target.name.clone(),
+                format!("{:.0} m", target.dcpa_at_start_m),
+                format!("{:.0} s", target.tcpa_at_start_s),
+                format!("{:.0} m", target.closest_m),
+                format!("{:.0} s", target.closest_at_s),
+                format!("{:.0} m", target.closest_hulls_m),
+                target.contact(),
+            ]);
+        }
+        writeln!(out, "{rows}")?;
+        writeln!(out, "Wrote {} and {}", self.files.csv.display(), self.files.jsonl.display())?;
+        writeln!(out, "Open {} in a browser to replay it", self.files.html.display())?;
+        Ok(())
+    }
+}
+
+impl TargetOutcome {
+    fn contact(&self) -> String {
+        match (self.first_hull_contact_s, self.first_circle_contact_s) {
+            (Some(hulls_s), _) => format!("hulls collide at {hulls_s:.0} s"),
+            (None, Some(circles_s)) => format!("from {circles_s:.0} s"),
+            (None, None) => format!("none within {:.0} m", self.contact_distance_m),
+        }
+    }
+}
+
+impl From<TargetSummary> for TargetOutcome {
+    fn from(summary: TargetSummary) -> Self {
+        Self {
+            name: summary.name,
+            dcpa_at_start_m: summary.start_cpa.distance_m,
+            tcpa_at_start_s: summary.start_cpa.time_s,
+            closest_m: summary.closest_centre_m,
+            closest_at_s: summary.closest_centre_time_s,
+            closest_hulls_m: summary.closest_hull_m,
+            contact_distance_m: summary.contact_distance_m,
+            circle_contacts: summary.circle_contacts,
+            first_circle_contact_s: summary.first_circle_contact_s,
+            first_hull_contact_s: summary.first_hull_contact_s,
+        }
+    }
+}

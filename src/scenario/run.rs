@@ -1,0 +1,315 @@
+//! Running a situation: own ship under its policy, the targets on their way, everything recorded.
+
+use super::model::Scenario;
+use super::setup::StagedEncounter;
+use super::streams::PositionSensor;
+use crate::episode::{Episode, HullPoint, PairStep, Step, VesselInfo, VesselRole, VesselStep};
+use crate::geo::Position;
+use crate::policy::{self, HoldCourse, OwnShip, Policy, Situation, TargetShip};
+use crate::vessel::{Kinematic, KinematicConfig, Linear, Motion, Steered, VesselState};
+use crate::world::{PairReport, VesselBody, VesselId, World, WorldConfig};
+
+impl StagedEncounter {
+    /// Runs the encounter under the scenario's own policy.
+    #[must_use]
+    pub fn run(&self) -> Episode {
+        // The name was checked when the scenario was set up.
+        let mut policy = policy::by_name(&self.scenario.policy).unwrap_or_else(|| Box::new(HoldCourse));
+        self.run_under(policy.as_mut())
+    }
+
+    /// Runs the encounter under any policy; the same policy gives the same episode.
+    pub fn run_under(&self, policy: &mut dyn Policy) -> Episode {
+        policy.reset(self.scenario.seed);
+        let mut voyage = Voyage::new(self);
+        let mut steps = vec![voyage.record()];
+        for step in 0..self.scenario.steps() {
+            if step % self.steps_per_decision() == 0 {
+                voyage.decide(policy);
+            }
+            voyage.advance();
+            steps.push(voyage.record());
+        }
+        self.episode(policy.name(), steps)
+    }
+
+    fn steps_per_decision(&self) -> usize {
+        let interval_s = self.scenario.own_ship.steering.decision_interval_s;
+        (interval_s / self.scenario.dt_s).round().max(1.0) as usize
+    }
+
+    fn description(&self) -> &str {
+        let Scenario { title, description, .. } = &self.scenario;
+        if description.is_empty() { title } else { description }
+    }
+
+    fn episode(&self, policy: &str, steps: Vec<Step>) -> Episode {
+        let own = vessel_info(&self.scenario.own_ship.name, VesselRole::Own, "kinematic", &self.own_body);
+        let targets = self
+            .targets
+            .iter()
+            .map(|target| vessel_info(&target.name, VesselRole::Target, target.motion_word, &target.body));
+        Episode {
+            scenario: self.scenario.name.clone(),
+            description: self.description().to_owned(),
+            seed: self.scenario.seed,
+            policy: policy.to_owned(),
+            dt_s: self.scenario.dt_s,
+            origin: self.plane.map(|plane| plane.origin),
+            vessels: std::iter::once(own).chain(targets).collect(),
+            steps,
+        }
+    }
+}
+
+fn vessel_info(name: &str, role: VesselRole, motion: &str, body: &VesselBody) -> VesselInfo {
+    let corner = |point: &crate::world::HullPoint| HullPoint {
+        forward_m: point.forward_m,
+        starboard_m: point.starboard_m,
+    };
+    VesselInfo {
+        name: name.to_owned(),
+        role,
+        motion: motion.to_owned(),
+        length_m: body.hull.length_m(),
+        beam_m: body.hull.beam_m(),
+        hull: body.hull.points().iter().map(corner).collect(),
+        collision_radius_m: body.collision_radius_m,
+    }
+}
+
+/// An encounter under way. Own ship is vessel 0, the targets follow.
+struct Voyage<'s> {
+    staged: &'s StagedEncounter,
+    own: Kinematic,
+    world: World,
+    step: i64,
+    /// Where each vessel truly is.
+    states: Vec<VesselState>,
+    sensors: Vec<PositionSensor>,
+    /// Where its sensor placed each vessel, up to this step.
+    observed: Vec<Vec<Position>>,
+}
+
+impl<'s> Voyage<'s> {
+    fn new(staged: &'s StagedEncounter) -> Self {
+        let scenario = &staged.scenario;
+        let own = Kinematic::new(
+            KinematicConfig { max_turn_deg: scenario.own_ship.steering.max_turn_deg },
+            staged.own_start.position,
+            staged.own_start.heading,
+            scenario.own_ship.speed_mps,
+        );
+        let targets = || staged.targets.iter();
+        let states: Vec<_> =
+            std::iter::once(own.state()).chain(targets().map(|target| target.motion.state(0))).collect();
+        let bodies = std::iter::once(&staged.own_body).chain(targets().map(|target| &target.body));
+        let mut world = World::new(WorldConfig { dt_s: scenario.dt_s, ..WorldConfig::default() });
+        for (body, state) in bodies.zip(&states) {
+            world.add_vessel(body.clone(), *state);
+        }
+        for target in 1..states.len() {
+            world.watch(VesselId(0), VesselId(target));
+        }
+        let mut sensors: Vec<_> = (0..states.len())
+            .map(|vessel| PositionSensor::new(scenario.seed, vessel, scenario.sensor_noise))
+            .collect();
+        let observed = past(staged)
+            .into_iter()
+            .zip(&mut sensors)
+            .map(|(past, sensor)| past.into_iter().map(|position| sensor.measure(position)).collect())
+            .collect();
+        Self { staged, own, world, step: 0, states, sensors, observed }
+    }
+
+    fn decide(&mut self, policy: &mut dyn Policy) {
+        let scenario = &self.staged.scenario;
+        let targets: Vec<_> = (1..self.states.len())
+            .map(|vessel| TargetShip {
+                position: self.sensed(vessel),
+                velocity: self.states[vessel].velocity,
+                history: &self.observed[vessel],
+                collision_distance_m: self.staged.own_body.collision_radius_m
+                    + self.staged.targets[vessel - 1].body.collision_radius_m,
+            })
+            .collect();
+        let own = OwnShip {
+            position: self.sensed(0),
+            velocity: self.states[0].velocity,
+            heading: self.states[0].heading,
+            ordered_heading: self.own.ordered_heading(),
+            max_turn_rad: self.own.max_turn_rad(),
+            history: &self.observed[0],
+        };
+        let command = policy.decide(&Situation {
+            time_s: self.step as f64 * scenario.dt_s,
+            dt_s: scenario.dt_s,
+            decision_s: self.staged.steps_per_decision() as f64 * scenario.dt_s,
+            own,
+            route: &self.staged.route,
+            targets: &targets,
+        });
+        self.own.order(command);
+    }
+
+    /// Where its sensor places a vessel now.
+    fn sensed(&self, vessel: usize) -> Position {
+        self.observed[vessel].last().copied().unwrap_or(self.states[vessel].position)
+    }
+
+    fn advance(&mut self) {
+        self.step += 1;
+        self.own.advance(self.staged.scenario.dt_s);
+        self.states[0] = self.own.state();
+        for (state, target) in self.states[1..].iter_mut().zip(&self.staged.targets) {
+            *state = target.motion.state(self.step);
+        }
+        self.world.step(&self.states);
+        for ((sensor, state), observed) in self.sensors.iter_mut().zip(&self.states).zip(&mut self.observed) {
+            observed.push(sensor.measure(state.position));
+        }
+    }
+
+    fn record(&self) -> Step {
+        let noisy = self.staged.scenario.sensor_noise.sigma_m > 0.0;
+        let vessels = self.states.iter().enumerate().map(|(vessel, state)| VesselStep {
+            position: state.position,
+            velocity: state.velocity,
+            heading: state.heading,
+            observed: noisy.then(|| self.sensed(vessel)),
+            ahead: Vec::new(),
+        });
+        Step { vessels: vessels.collect(), pairs: self.world.reports().iter().map(pair_step).collect() }
+    }
+}
+
+/// Where each vessel was before the start, oldest first, the start last. Own ship came straight on.
+fn past(staged: &StagedEncounter) -> Vec<Vec<Position>> {
+    let scenario = &staged.scenario;
+    let count = (scenario.history_s / scenario.dt_s).ceil().max(0.0) as usize + 1;
+    let own = Linear::new(staged.own_start.position, staged.own_start.velocity, scenario.dt_s);
+    let motions = std::iter::once(&own as &dyn Motion)
+        .chain(staged.targets.iter().map(|target| target.motion.as_ref() as &dyn Motion));
+    motions
+        .map(|motion| {
+            let mut positions = vec![Position::ORIGIN; count];
+            motion.history(0, &mut positions);
+            positions
+        })
+        .collect()
+}
+
+fn pair_step(report: &PairReport) -> PairStep {
+    PairStep {
+        centre_distance_m: report.centre_distance_m,
+        hull_distance_m: report.hull_distance_m,
+        closest_centre_m: report.min_centre_distance_m,
+        closest_centre_time_s: report.min_centre_time_s,
+        closest_hull_m: report.min_hull_distance_m,
+        circle_contact_time_s: report.circle_contact_time_s,
+        hull_contact_time_s: report.hull_contact_time_s,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::Nautical;
+    use crate::scenario::{OwnShip as Own, Placement, Point, TargetMotion};
+    use crate::vessel::Command;
+
+    fn head_on() -> Scenario {
+        let south = Placement::At {
+            point: Point::local(4000.0, 0.0),
+            course: Nautical::from_degrees(180.0),
+            speed_mps: 6.0,
+        };
+        Scenario::new("head_on", Own::head_on_to("ship", 240.0)).target("ship", TargetMotion::Linear(south))
+    }
+
+    /// Keeps what it was shown, and turns to starboard at every decision.
+    #[derive(Debug, Default)]
+    struct Recorder {
+        seeds: Vec<u64>,
+        times_s: Vec<f64>,
+        target_history: Vec<Position>,
+    }
+
+    impl Policy for Recorder {
+        fn name(&self) -> &str {
+            "recorder"
+        }
+
+        fn reset(&mut self, seed: u64) {
+            self.seeds.push(seed);
+        }
+
+        fn decide(&mut self, situation: &Situation<'_>) -> Command {
+            self.times_s.push(situation.time_s);
+            self.target_history = situation.targets[0].history.to_vec();
+            assert_eq!(situation.own.history.last(), Some(&situation.own.position));
+            assert_eq!(situation.targets[0].collision_distance_m, 300.0);
+            Command { turn_rad: situation.own.max_turn_rad, speed_mps: None }
+        }
+    }
+
+    #[test]
+    fn holding_course_meets_the_target_at_the_time_to_collision() {
+        let episode = head_on().set_up().unwrap().run();
+        let summary = &episode.summaries()[0];
+        assert!(summary.closest_centre_m < 1e-6);
+        assert!((summary.closest_centre_time_s - 240.0).abs() < 1e-6);
+        // The circles touch when the centres are 300 m apart, at a closing speed of 14 m/s.
+        assert!((summary.first_circle_contact_s.unwrap() - (240.0 - 300.0 / 14.0)).abs() < 1e-6);
+        assert!(summary.first_hull_contact_s.is_some());
+        assert_eq!(episode.steps.len(), 61);
+    }
+
+    #[test]
+    fn a_policy_is_asked_once_per_decision_and_obeyed() {
+        let mut recorder = Recorder::default();
+        let episode = head_on().seed(9).set_up().unwrap().run_under(&mut recorder);
+        assert_eq!(recorder.seeds, [9]);
+        assert_eq!(recorder.times_s, (0..15).map(|k| f64::from(k) * 20.0).collect::<Vec<_>>());
+        assert_eq!(episode.policy, "recorder");
+        let turned = episode.steps[60].vessels[0].heading.turn_from(episode.steps[0].vessels[0].heading);
+        assert!((turned.to_degrees() - 36.0).abs() < 1e-9);
+        // 375 s before the start, the start, and 280 s up to the last decision.
+        assert_eq!(recorder.target_history.len(), 75 + 1 + 56);
+        assert_eq!(recorder.target_history[75], Position { north_m: 4000.0, east_m: 0.0 });
+    }
+
+    #[test]
+    fn sensors_err_alike_whatever_the_policy_does() {
+        let errors = |policy: &mut dyn Policy| {
+            let episode = head_on().sensor_noise_m(10.0).seed(3).set_up().unwrap().run_under(policy);
+            let vessels = episode.steps.iter().flat_map(|step| step.vessels.clone());
+            vessels.map(|vessel| vessel.observed.unwrap() - vessel.position).collect::<Vec<_>>()
+        };
+        let held = errors(&mut HoldCourse);
+        let turned = errors(&mut Recorder::default());
+        assert!(held.iter().any(|error| error.length_m() > 10.0));
+        for (held, turned) in held.iter().zip(&turned) {
+            assert!((*held + -*turned).length_m() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn without_noise_nothing_is_said_of_sensors() {
+        let episode = head_on().set_up().unwrap().run();
+        assert!(episode.steps.iter().flat_map(|step| &step.vessels).all(|vessel| vessel.observed.is_none()));
+    }
+
+    #[test]
+    fn a_route_leads_own_ship_where_no_course_is_given() {
+        let own = Own::heading(0.0).route(&[Point::local(1000.0, 1000.0), Point::local(1000.0, 5000.0)]);
+        let mut scenario = Scenario::new("route", own).duration_s(900.0).policy("rule-based");
+        scenario.own_ship.start =
+            crate::scenario::OwnStart::At { point: Point::local(0.0, 0.0), course: None };
+        scenario.own_ship.steering.max_turn_deg = 20.0;
+        let episode = scenario.set_up().unwrap().run();
+        assert!((episode.steps[0].vessels[0].heading.degrees() - 45.0).abs() < 1e-9);
+        let last = &episode.steps[180].vessels[0];
+        assert!((last.heading.degrees() - 90.0).abs() < 2.0 && (last.position.north_m - 1000.0).abs() < 50.0);
+    }
+}
