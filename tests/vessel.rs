@@ -1,7 +1,15 @@
-//! `searoom vessel`: what the program prints and writes of the standard manoeuvres.
+//! `searoom vessel`: what the program prints and writes of the standard manoeuvres; and ships with real
+//! dynamics in the world.
 
 use std::fs;
 
+use searoom::angle::Nautical;
+use searoom::geo::Position;
+use searoom::policy::{
+    HoldCourse, OwnShip, Policy, Route, RuleBased, RuleBasedConfig, Situation, TargetShip,
+};
+use searoom::vessel::{Dynamics, DynamicsConfig};
+use searoom::world::{Bow, Hull, VesselBody, World, WorldConfig};
 use serde_json::Value;
 
 use crate::cli::searoom;
@@ -55,4 +63,63 @@ fn an_angle_that_no_rudder_has_is_refused_with_a_remedy() {
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(message.contains(arguments[2]) && message.contains("give a number from"), "{message}");
     }
+}
+
+/// Two KVLCC2 meet head-on, the other holding its course; the least distances of centres and hulls.
+fn tankers_head_on(policy: &mut dyn Policy) -> (f64, f64) {
+    const RANGE_M: f64 = 12_000.0;
+    const DT_S: f64 = 5.0;
+    let config = DynamicsConfig { dynamics: Dynamics::Kvlcc2, ..DynamicsConfig::default() };
+    let mut own = config.launch(Position::ORIGIN, Nautical::NORTH, 7.0);
+    let start = Position { north_m: RANGE_M, east_m: 0.0 };
+    let mut other = config.launch(start, Nautical::from_degrees(180.0), 7.0);
+
+    let mut world = World::new(WorldConfig { dt_s: DT_S, ..WorldConfig::default() });
+    let hull = Hull::new(320.0, 58.0, Bow::Full).expect("a hull");
+    let body = VesselBody { hull, collision_radius_m: 500.0 };
+    let a = world.add_vessel(body.clone(), own.state());
+    let b = world.add_vessel(body, other.state());
+    let pair = world.watch(a, b);
+
+    let route = Route::straight(Position::ORIGIN, Nautical::NORTH);
+    let (mut centres_m, mut hulls_m) = (f64::INFINITY, f64::INFINITY);
+    for step in 0..240 {
+        if step % 4 == 0 {
+            let (state, target) = (own.state(), other.state());
+            let targets = [TargetShip {
+                position: target.position,
+                velocity: target.velocity,
+                history: &[],
+                collision_distance_m: 1000.0,
+            }];
+            own.order(policy.decide(&Situation {
+                time_s: world.time_s(),
+                dt_s: DT_S,
+                decision_s: 4.0 * DT_S,
+                own: OwnShip {
+                    position: state.position,
+                    velocity: state.velocity,
+                    heading: state.heading,
+                    ordered_heading: own.ordered_heading(),
+                    max_turn_rad: own.max_turn_rad(),
+                    history: &[],
+                },
+                route: &route,
+                targets: &targets,
+            }));
+        }
+        own.advance(DT_S);
+        other.advance(DT_S);
+        let report = world.step(&[own.state(), other.state()])[pair];
+        centres_m = centres_m.min(report.min_centre_distance_m);
+        hulls_m = hulls_m.min(report.min_hull_distance_m);
+    }
+    (centres_m, hulls_m)
+}
+
+#[test]
+fn a_tanker_keeps_clear_of_another_in_the_world_if_its_policy_does() {
+    assert_eq!(tankers_head_on(&mut HoldCourse).1, 0.0);
+    let (centres_m, hulls_m) = tankers_head_on(&mut RuleBased::new(RuleBasedConfig::default()));
+    assert!(centres_m > 1000.0 && hulls_m > 600.0, "{centres_m} {hulls_m}");
 }

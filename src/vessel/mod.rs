@@ -11,6 +11,7 @@ use std::fmt;
 use crate::angle::Nautical;
 use crate::geo::{Position, Velocity};
 
+pub mod dynamics;
 pub mod kinematic;
 pub mod linear;
 pub mod mmg;
@@ -21,6 +22,7 @@ pub mod recorded;
 pub mod stochastic;
 pub mod waypoints;
 
+pub use dynamics::{Dynamics, DynamicsConfig};
 pub use kinematic::{Kinematic, KinematicConfig};
 pub use linear::Linear;
 pub use mmg::{MmgConfig, MmgShip};

@@ -101,10 +101,9 @@ impl Hull {
         }
         let port = port_side(length_m, beam_m, bow);
         let stem = HullPoint { forward_m: length_m / 2.0, starboard_m: 0.0 };
-        let starboard =
-            port.iter().rev().map(|point| HullPoint { starboard_m: -point.starboard_m, ..*point });
         // Counter-clockwise seen from above: up the starboard side, round the stem, down to port.
-        let points: Vec<_> = starboard.rev().chain([stem]).chain(port.iter().rev().copied()).collect();
+        let starboard = port.iter().map(|point| HullPoint { starboard_m: -point.starboard_m, ..*point });
+        let points: Vec<_> = starboard.chain([stem]).chain(port.iter().rev().copied()).collect();
         let outline: Vec<_> = points.iter().map(|p| Vector2::new(p.forward_m, -p.starboard_m)).collect();
         let radius_m = outline.iter().map(|point| point.norm()).fold(0.0, f64::max);
         Ok(Self { length_m, beam_m, radius_m, points, outline })
