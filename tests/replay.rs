@@ -250,10 +250,23 @@ fn the_page_turns_dark_and_shows_hostile_names_as_text() {
 }
 
 #[test]
-fn an_episode_without_steps_says_so() {
-    let page = page_of(&Episode { steps: Vec::new(), ..episode() }, "replay-empty");
+fn the_smallest_episodes_make_pages_without_complaints() {
     let mut browser = Browser::start();
+    let page = page_of(&Episode { steps: Vec::new(), ..episode() }, "replay-empty");
     browser.open(&page, Screen::PHONE);
     assert_eq!(browser.eval("document.getElementById('outcome').textContent"), json!("No steps recorded"));
+    browser.assert_quiet();
+
+    let mut alone = episode();
+    alone.vessels.truncate(1);
+    alone.steps.truncate(1);
+    alone.steps[0].vessels.truncate(1);
+    alone.steps[0].pairs.clear();
+    let page = page_of(&alone, "replay-alone");
+    browser.open(&page, Screen::PHONE);
+    browser.wait_for("document.getElementById('scene').width > 0");
+    browser.click("#play");
+    assert_eq!(clock(&mut browser), "00:00 / 00:00");
+    assert!(pixels_of(&mut browser, 0) > 20);
     browser.assert_quiet();
 }

@@ -2,7 +2,10 @@
 
 const margin = { left: 46, right: 12, top: 12, bottom: 24 };
 
-const farthest = Math.max(1, ...targets.flatMap((target) => target.distance_m), ...targets.map((target) => target.contact_distance_m));
+const farthest = targets.reduce(
+  (most, target) => target.distance_m.reduce((a, b) => Math.max(a, b), Math.max(most, target.contact_distance_m)),
+  1,
+);
 
 function plotArea(width, height) {
   const right = width - margin.right;
