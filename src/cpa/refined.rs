@@ -288,6 +288,8 @@ fn settings(config: RefineConfig) -> DefaultSettings<f64> {
         .tol_gap_abs(config.gap_tolerance)
         .tol_gap_rel(config.gap_tolerance)
         .tol_feas(config.feasibility_tolerance)
+        // Scaled data of this size need no second solve of each system; it would cost a third more.
+        .iterative_refinement_enable(false)
         // The data are scaled here, for each step anew; Clarabel would keep the scaling of the first.
         .equilibrate_enable(false)
         // Data updates are refused where presolving has changed the structure.

@@ -89,6 +89,19 @@ impl DistanceCurve {
         &self.smoothed_m
     }
 
+    /// The smoothed distance between two time steps, in metres: a `fraction` of the step that begins
+    /// with smoothed distance `index`, both vessels moving straight.
+    ///
+    /// # Panics
+    /// Where there is no smoothed distance `index + 1`.
+    #[must_use]
+    pub fn smoothed_within_m(&self, index: usize, fraction: f64) -> f64 {
+        let width = 2 * self.half_width + 1;
+        let pairs = self.relative[index..=index + width].windows(2);
+        let sum: f64 = pairs.map(|pair| pair[0].lerp(&pair[1], fraction).norm()).sum();
+        sum / width as f64
+    }
+
     /// Time of a step, in seconds from now.
     #[must_use]
     pub fn time_s(&self, step: usize) -> f64 {
@@ -151,6 +164,16 @@ mod tests {
         assert_eq!(curve.raw_m(), [3.0, 9.0, 6.0, 0.0]);
         assert_eq!(curve.smoothed_m(), [6.0, 5.0]);
         assert_eq!(curve.closest(), Cpa { distance_m: 5.0, time_s: 5.0 });
+    }
+
+    #[test]
+    fn between_steps_the_terms_move_straight() {
+        let mut curve = DistanceCurve::new(1);
+        curve.fill(STILL, [3.0, 9.0, 6.0, 0.0, -8.0].map(|x| Vector2::new(x, 0.0)), 1, 5.0);
+        assert_eq!(curve.smoothed_within_m(0, 0.0), curve.smoothed_m()[0]);
+        assert_eq!(curve.smoothed_within_m(1, 1.0), curve.smoothed_m()[2]);
+        // 7.5, 3 and 4 metres away half way from the second to the third.
+        assert!((curve.smoothed_within_m(1, 0.5) - 14.5 / 3.0).abs() < 1e-12);
     }
 
     #[test]
