@@ -110,3 +110,14 @@ impl SeedDomain {
         (index & (u64::MAX >> 2)) | (domain << 62)
     }
 }
+
+/// Refuses an action that no environment could take.
+fn check_action(action: &[f32], expected: usize) -> Result<(), ActionError> {
+    if action.len() != expected {
+        return Err(ActionError::Length { given: action.len(), expected });
+    }
+    match action.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(ActionError::NotFinite { index, value: action[index] }),
+        None => Ok(()),
+    }
+}

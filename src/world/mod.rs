@@ -249,6 +249,22 @@ impl World {
         &self.reports
     }
 
+    /// Puts one vessel elsewhere without moving it there: the next step starts from this state, and
+    /// the reports on its pairs are those of this moment.
+    ///
+    /// # Panics
+    /// Where the vessel is not of this world.
+    pub fn place(&mut self, vessel: VesselId, state: &VesselState) {
+        self.vessels[vessel.0].put(state);
+        self.bodies.put(vessel.0, self.vessels[vessel.0].motion.after());
+        for index in 0..self.reports.len() {
+            let (a, b) = (self.reports[index].a, self.reports[index].b);
+            if a == vessel || b == vessel {
+                (self.reports[index], self.separations[index]) = self.report_now(a, b);
+            }
+        }
+    }
+
     /// What the last step brought for the watched pairs, in the order in which they were watched.
     #[must_use]
     pub fn reports(&self) -> &[PairReport] {

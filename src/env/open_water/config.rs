@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::cpa::CpaMethod;
 use crate::vessel::{PeriodicConfig, StochasticConfig};
 
 /// How the obstacles leave their straight lines.
@@ -13,17 +14,6 @@ pub enum MotionKind {
     Stochastic,
     /// A sine across the course, with noise.
     Periodic,
-}
-
-/// How distance and time of the closest point of approach are taken from a forecast.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "kebab-case")]
-pub enum CpaKind {
-    /// At the best sample, refined within the steps around it.
-    #[default]
-    Refined,
-    /// At the best sample.
-    Sampled,
 }
 
 /// Constants of the environment (paper, tables "Environment parameters" and section "Training
@@ -69,10 +59,8 @@ pub struct OpenWaterConfig {
     pub stochastic: StochasticConfig,
     /// Constants of the periodic motion.
     pub periodic: PeriodicConfig,
-    /// Whether the observation holds estimates of the collision risk.
-    pub estimates: bool,
     /// How estimates are taken from a forecast.
-    pub cpa: CpaKind,
+    pub cpa: CpaMethod,
     /// Steps `T` that obstacles are forecast, and backcast, over.
     pub forecast_steps: usize,
     /// Half-width `n` of the moving average over distances.
@@ -81,6 +69,12 @@ pub struct OpenWaterConfig {
     pub estimate_every_steps: usize,
     /// Scale of positions in the observation, in metres.
     pub position_scale_m: f64,
+    /// Length of every vessel's hull, in metres; hulls and circles are watched, not rewarded.
+    pub vessel_length_m: f64,
+    /// Beam of every vessel's hull, in metres.
+    pub vessel_beam_m: f64,
+    /// Radius of every vessel's collision circle, in metres.
+    pub collision_radius_m: f64,
     /// Scale of DCPA in the observation, in metres.
     pub dcpa_scale_m: f64,
     /// Scale of TCPA in the observation, in seconds.
@@ -109,12 +103,14 @@ impl Default for OpenWaterConfig {
             motion: MotionKind::default(),
             stochastic: StochasticConfig::default(),
             periodic: PeriodicConfig::default(),
-            estimates: true,
-            cpa: CpaKind::default(),
+            cpa: CpaMethod::default(),
             forecast_steps: 100,
             smoothing_half_width: 10,
             estimate_every_steps: 10,
             position_scale_m: 3000.0,
+            vessel_length_m: 20.0,
+            vessel_beam_m: 5.0,
+            collision_radius_m: 20.0,
             dcpa_scale_m: 400.0,
             tcpa_scale_s: 300.0,
         }

@@ -171,13 +171,13 @@ impl Field {
         &self.passings
     }
 
-    /// Obstacles replaced in the last step.
+    /// Obstacles replaced last, by index.
     #[must_use]
     pub fn replaced(&self) -> &[usize] {
         &self.replaced
     }
 
-    /// Moves everything on by one step, notes passings, and replaces obstacles that are behind.
+    /// Moves everything on by one step and notes passings; [`Self::replace_passed`] comes next.
     /// `action` is the lateral acceleration over its greatest value, clipped to `[-1, 1]`.
     pub fn advance(&mut self, action: f64) {
         let dt_s = self.config.dt_s;
@@ -195,6 +195,10 @@ impl Field {
             }
         }
         self.step += 1;
+    }
+
+    /// Replaces obstacles that are behind: as soon as two of a rule are, the one passed earlier.
+    pub fn replace_passed(&mut self) {
         self.replaced.clear();
         self.replace(PassingRule::Right);
         self.replace(PassingRule::Left);
@@ -215,7 +219,6 @@ impl Field {
         self.replaced.clear();
     }
 
-    /// As soon as two obstacles of a rule are passed, the one passed earlier is replaced.
     fn replace(&mut self, rule: PassingRule) {
         loop {
             let of_rule = self.obstacles.iter().enumerate().filter(|(_, obstacle)| obstacle.rule == rule);
@@ -337,11 +340,12 @@ mod tests {
                 let before: Vec<_> =
                     field.obstacles().iter().map(|o| o.position().x - field.agent().position.x).collect();
                 field.advance(0.3);
-                for passing in field.passings().iter().filter(|p| !field.replaced().contains(&p.obstacle)) {
+                for passing in field.passings() {
                     let obstacle = &field.obstacles()[passing.obstacle];
                     let after_m = obstacle.position().x - field.agent().position.x;
                     assert!(before[passing.obstacle] * after_m <= 1e-9, "did not change sides: {after_m}");
                 }
+                field.replace_passed();
             }
         }
     }
@@ -357,6 +361,7 @@ mod tests {
                     assert_eq!(field.obstacles().iter().filter(|o| o.rule == rule).count(), 5);
                 }
                 field.advance(0.0);
+                field.replace_passed();
             }
         }
     }
@@ -409,6 +414,7 @@ mod tests {
                     assert!(if right { on_path_m < -30.0 } else { on_path_m > 30.0 }, "{on_path_m}");
                     judged += 1;
                 }
+                field.replace_passed();
             }
         }
         assert!(judged > 300, "{judged}");
@@ -420,6 +426,8 @@ mod tests {
         for step in 0..200 {
             calm.advance(0.0);
             wild.advance(if step % 3 == 0 { 1.0 } else { -0.4 });
+            calm.replace_passed();
+            wild.replace_passed();
             for (a, b) in calm.obstacles().iter().zip(wild.obstacles()) {
                 assert_eq!(a.position(), b.position());
             }
