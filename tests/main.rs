@@ -11,3 +11,4 @@ mod rl_golden;
 mod rl_learning;
 mod scenario;
 mod vessel;
+mod rl;

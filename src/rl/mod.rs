@@ -5,6 +5,7 @@
 
 pub mod actor;
 pub mod agent;
+pub mod checkpoint;
 pub mod critics;
 pub mod networks;
 pub mod replay;

@@ -1,5 +1,5 @@
 //! LSTM-TD3 and LSTM-SAC against PyTorch: losses, every gradient, weights and targets after each of
-//! three updates. `golden/make_rl.py` made the files.
+//! three updates. `tests/golden/make_rl.py` made the files.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
