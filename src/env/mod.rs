@@ -7,6 +7,7 @@
 
 use thiserror::Error;
 
+pub mod coastal;
 pub mod open_water;
 
 /// What one decision brought.

@@ -41,7 +41,7 @@ fn chunk_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn load_error(folder: &Path, config: TrainerConfig) -> CheckpointError {
-    checkpoint::load(folder, &mut trainer(config)).err().expect("an error")
+    checkpoint::load(folder, &mut trainer(config)).expect_err("an error")
 }
 
 #[test]

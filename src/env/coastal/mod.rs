@@ -1,0 +1,473 @@
+//! Head-on encounters with recorded vessels in coastal waters (paper, section "Reinforcement learning
+//! environment" of the maritime study).
+//!
+//! Obstacle 1 replays a recorded track: in scenario 1 it is about to turn to port and clear, in scenario
+//! 2 it goes straight on. Three more move in straight lines. Own ship changes its heading once every
+//! 20 s.
+//!
+//! | action | range | unit |
+//! | --- | --- | --- |
+//! | change of heading over its greatest value, positive to starboard | `[-1, 1]`, clipped | 2.4° |
+//!
+//! | observation | value | scale |
+//! | --- | --- | --- |
+//! | 0 | own speed | 5 m/s |
+//! | 1 | cross-track error, positive to port of the undisturbed path | 200 m |
+//! | 2 + 6 j | distance less 300 m | 3000 m |
+//! | 3 + 6 j | relative bearing, `(-pi, pi]` | pi |
+//! | 4 + 6 j | course of the obstacle less own heading, `(-pi, pi]` | pi |
+//! | 5 + 6 j | speed of the obstacle | 5 m/s |
+//! | 6 + 6 j | estimated DCPA less 300 m | 100 m |
+//! | 7 + 6 j | estimated TCPA | 100 s |
+//!
+//! `j` counts obstacles by ascending estimated DCPA. Without estimates there are four values per
+//! obstacle, sorted by distance. Ties go to the lower index. Sensor noise touches positions, and what is
+//! computed from them, in the observation; rewards and contacts use the true ones.
+//!
+//! | reward term | value |
+//! | --- | --- |
+//! | `wrong_side` | -1 where the cross-track error is 200 m to port or more |
+//! | `too_close` | minus the number of obstacles within 300 m |
+
+mod config;
+mod traffic;
+
+pub use config::{CoastalConfig, EstimateSource, ScenarioChoice};
+pub use traffic::{Opening, SensorNoise};
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+use super::{ActionError, Env, RewardTerm, Step, check_action};
+use crate::cpa::linear::closest_approach;
+use crate::cpa::{Cpa, CpaConfig, Estimator, StraightMotion};
+use crate::forecast::{Forecaster, Forecasts};
+use crate::geo::Position;
+use crate::scenario::encounter_starts::{HeadOnKind, HeadOnStart, HeadOnStarts};
+use crate::track::Track;
+use crate::vessel::{Command, Kinematic, KinematicConfig, Linear, Motion, Recorded, Steered, VesselState};
+use crate::world::{Bow, Hull, HullError, PairReport, VesselBody, VesselId, World, WorldConfig};
+
+/// Why there is no coastal environment.
+#[derive(Debug, Error)]
+pub enum CoastalError {
+    /// The tracks offer no start of a scenario that is asked for.
+    #[error(
+        "none of the {tracks} track(s) offers a start of the scenario `{kind:?}`; take more tracks, another area, \
+         or another `scenario`"
+    )]
+    NoStart {
+        /// Tracks searched.
+        tracks: usize,
+        /// The scenario.
+        kind: HeadOnKind,
+    },
+    /// A track is on another time grid than the first.
+    #[error(
+        "track {index} has positions {dt_s} s apart, the first {expected_s} s; import them with one step"
+    )]
+    TimeStep {
+        /// Index of the track.
+        index: usize,
+        /// Its time step, in seconds.
+        dt_s: f64,
+        /// That of the first track.
+        expected_s: f64,
+    },
+    /// The configured hull is none.
+    #[error(transparent)]
+    Hull(#[from] HullError),
+}
+
+/// The recorded vessels of an area and the starts found on their tracks; shared by many environments.
+#[derive(Debug)]
+pub struct RecordedTraffic {
+    replays: Vec<Recorded>,
+    starts: HeadOnStarts,
+    dt_s: f64,
+}
+
+impl RecordedTraffic {
+    /// Finds the starts on the tracks.
+    ///
+    /// # Errors
+    ///
+    /// When a scenario that `config` asks for has no start, or tracks differ in their time step.
+    pub fn new(tracks: Vec<Track>, config: &CoastalConfig) -> Result<Self, CoastalError> {
+        let starts = HeadOnStarts::find(&tracks, &config.head_on);
+        if let Some(&kind) = config.scenario.kinds().iter().find(|kind| starts.of(**kind).is_empty()) {
+            return Err(CoastalError::NoStart { tracks: tracks.len(), kind });
+        }
+        let dt_s = tracks.first().map_or(0.0, |track| track.dt_s);
+        if let Some(index) = tracks.iter().position(|track| track.dt_s != dt_s) {
+            return Err(CoastalError::TimeStep { index, dt_s: tracks[index].dt_s, expected_s: dt_s });
+        }
+        let replays = tracks.into_iter().map(|track| Recorded::new(Arc::new(track), dt_s)).collect();
+        Ok(Self { replays, starts, dt_s })
+    }
+
+    /// The starts.
+    #[must_use]
+    pub fn starts(&self) -> &HeadOnStarts {
+        &self.starts
+    }
+
+    fn replay(&self, start: HeadOnStart) -> Recorded {
+        self.replays[start.track].from_offset(start.index as f64 * self.dt_s)
+    }
+}
+
+/// What happened in an episode so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// The scenario.
+    pub kind: HeadOnKind,
+    /// Whether collision circles touched at any time.
+    pub contact: bool,
+    /// Whether they touched at the time of a decision.
+    pub contact_at_decision: bool,
+    /// Whether the cross-track error reached its limit at the time of a decision.
+    pub wrong_side: bool,
+    /// Closest distance of centres at any time, in metres.
+    pub closest_m: f64,
+}
+
+/// The environment.
+pub struct Coastal {
+    config: CoastalConfig,
+    traffic: Arc<RecordedTraffic>,
+    forecaster: Option<Box<dyn Forecaster>>,
+    estimator: Estimator,
+    /// Forecasts without noise depend on the track alone and are kept.
+    known_paths: HashMap<(usize, usize), Arc<[Position]>>,
+    forecasts: Forecasts,
+    world: World,
+    episode: Option<Episode>,
+    states: Vec<VesselState>,
+    estimates: Vec<Cpa>,
+    order: Vec<usize>,
+    terms: [RewardTerm; 2],
+    fallbacks: u64,
+}
+
+/// The episode under way.
+struct Episode {
+    opening: Opening,
+    own: Kinematic,
+    recorded: Recorded,
+    noise: SensorNoise,
+    decision: usize,
+    outcome: Outcome,
+}
+
+impl Episode {
+    /// Time steps since the start.
+    fn step(&self, steps_per_decision: usize) -> i64 {
+        (self.decision * steps_per_decision) as i64
+    }
+}
+
+impl Coastal {
+    /// The environment. A forecaster makes estimates part of the observation; without one it is the
+    /// baseline's.
+    ///
+    /// # Errors
+    ///
+    /// When the configured hull is none.
+    pub fn new(
+        config: CoastalConfig,
+        traffic: Arc<RecordedTraffic>,
+        forecaster: Option<Box<dyn Forecaster>>,
+    ) -> Result<Self, CoastalError> {
+        let body = VesselBody {
+            hull: Hull::new(config.vessel_length_m, config.vessel_beam_m, Bow::default())?,
+            collision_radius_m: config.collision_distance_m / 2.0,
+        };
+        let mut world = World::new(WorldConfig { dt_s: traffic.dt_s, ..WorldConfig::default() });
+        let nowhere = VesselState::on_course(Position::ORIGIN, crate::angle::Nautical::NORTH, 0.0);
+        let obstacles = 1 + config.linear_obstacles;
+        let ids: Vec<VesselId> = (0..=obstacles).map(|_| world.add_vessel(body.clone(), nowhere)).collect();
+        for &obstacle in &ids[1..] {
+            world.watch(ids[0], obstacle);
+        }
+        Ok(Self {
+            estimator: Estimator::new(&CpaConfig { smoothing: 0, ..CpaConfig::default() }),
+            traffic,
+            forecaster,
+            known_paths: HashMap::new(),
+            forecasts: Forecasts::new(),
+            world,
+            episode: None,
+            states: Vec::new(),
+            estimates: vec![Cpa::UNKNOWN; obstacles],
+            order: Vec::new(),
+            terms: [
+                RewardTerm { name: "wrong_side", value: 0.0 },
+                RewardTerm { name: "too_close", value: 0.0 },
+            ],
+            fallbacks: 0,
+            config,
+        })
+    }
+
+    /// What happened in the episode so far; nothing before the first reset.
+    #[must_use]
+    pub fn outcome(&self) -> Option<Outcome> {
+        self.episode.as_ref().map(|episode| episode.outcome)
+    }
+
+    /// How the episode started; nothing before the first reset.
+    #[must_use]
+    pub fn opening(&self) -> Option<&Opening> {
+        self.episode.as_ref().map(|episode| &episode.opening)
+    }
+
+    /// What the last time step brought between own ship and each obstacle.
+    #[must_use]
+    pub fn reports(&self) -> &[PairReport] {
+        self.world.reports()
+    }
+
+    /// True states: own ship, the recorded vessel, then the others.
+    #[must_use]
+    pub fn states(&self) -> &[VesselState] {
+        &self.states
+    }
+
+    /// Estimates so far that rest on a straight line in place of a forecast.
+    #[must_use]
+    pub fn fallbacks(&self) -> u64 {
+        self.fallbacks
+    }
+
+    fn steps_per_decision(&self) -> usize {
+        (self.config.head_on.decision_interval_s / self.traffic.dt_s).round().max(1.0) as usize
+    }
+
+    fn read_states(states: &mut Vec<VesselState>, episode: &Episode, step: i64) {
+        states.clear();
+        states.push(episode.own.state());
+        states.push(episode.recorded.state(step));
+        states.extend(episode.opening.linear.iter().map(|linear: &Linear| linear.state(step)));
+    }
+
+    /// Cross-track error of a position, positive to port of the undisturbed path.
+    fn cross_track_m(opening: &Opening, position: Position) -> f64 {
+        -(position - opening.path.position).starboard_of_m(opening.path.course)
+    }
+
+    /// A vessel's position as its sensor gives it.
+    fn sensed(&self, episode: &Episode, vessel: usize, step: i64, position: Position) -> Position {
+        position + episode.noise.at(vessel, step) * self.config.noise_m
+    }
+
+    fn estimate(&mut self, episode: &Episode) {
+        if self.forecaster.is_none() {
+            return;
+        }
+        let step = episode.step(self.steps_per_decision());
+        let own = StraightMotion {
+            position: self.sensed(episode, 0, step, self.states[0].position).xy(),
+            velocity: self.states[0].velocity.xy(),
+        };
+        if episode.decision.is_multiple_of(self.config.forecast_every_decisions) {
+            self.estimates[0] = self.estimate_recorded(episode, step, own);
+        } else {
+            self.estimates[0].time_s -= self.config.head_on.decision_interval_s;
+        }
+        for vessel in 2..self.states.len() {
+            let position = self.sensed(episode, vessel, step, self.states[vessel].position).xy();
+            let velocity = self.states[vessel].velocity.xy();
+            self.estimates[vessel - 1] = closest_approach(own.position, own.velocity, position, velocity);
+        }
+    }
+
+    /// The CPA with the recorded vessel: observed positions and those that follow in one row.
+    fn estimate_recorded(&mut self, episode: &Episode, step: i64, own: StraightMotion) -> Cpa {
+        let length = self.config.history_positions as i64;
+        let history: Vec<Position> = (step + 1 - length..=step)
+            .map(|k| self.sensed(episode, 1, k, episode.recorded.position(k)))
+            .collect();
+        let path = match self.config.estimates {
+            EstimateSource::Truth => {
+                let (_, last) = episode.recorded.covered_steps();
+                let last = last.min(step + self.config.forecast_steps as i64);
+                Some((step + 1..=last).map(|k| episode.recorded.position(k)).collect())
+            }
+            EstimateSource::Forecast => self.forecast(episode, step, &history),
+        };
+        let Some(path) = path else {
+            // Fewer than two finite positions: the present course and speed stand in.
+            self.fallbacks += 1;
+            let position = self.sensed(episode, 1, step, self.states[1].position).xy();
+            return closest_approach(own.position, own.velocity, position, self.states[1].velocity.xy());
+        };
+        let now = history.len() - 1;
+        let row = history.iter().chain(path.iter()).map(|position| position.xy());
+        self.estimator.estimate(own, row, now, self.traffic.dt_s).cpa
+    }
+
+    fn forecast(&mut self, episode: &Episode, step: i64, history: &[Position]) -> Option<Arc<[Position]>> {
+        let start = episode.opening.start;
+        let key = (start.track, start.index + step as usize);
+        let is_known_once = self.config.noise_m == 0.0;
+        if let Some(path) = self.known_paths.get(&key).filter(|_| is_known_once) {
+            return Some(Arc::clone(path));
+        }
+        let forecaster = self.forecaster.as_mut()?;
+        forecaster.forecast(&[history], self.config.forecast_steps, &mut self.forecasts).ok()?;
+        self.fallbacks += self.forecasts.fallbacks() as u64;
+        let path: Arc<[Position]> = self.forecasts.path(0).into();
+        if is_known_once {
+            self.known_paths.insert(key, Arc::clone(&path));
+        }
+        Some(path)
+    }
+
+    fn observe(&mut self, episode: &Episode, observation: &mut [f32]) {
+        let step = episode.step(self.steps_per_decision());
+        let own = self.states[0];
+        let own_position = self.sensed(episode, 0, step, own.position);
+        let config = &self.config;
+        let mut values = observation.iter_mut();
+        let mut write = |value: f64| {
+            if let Some(slot) = values.next() {
+                *slot = value as f32;
+            }
+        };
+        write(own.velocity.speed_mps() / config.speed_scale_mps);
+        write(Self::cross_track_m(&episode.opening, own_position) / config.cross_track_scale_m);
+
+        let apart: Vec<_> = (1..self.states.len())
+            .map(|vessel| self.sensed(episode, vessel, step, self.states[vessel].position) - own_position)
+            .collect();
+        let has_estimates = self.forecaster.is_some();
+        let key = |index: usize| {
+            if has_estimates { self.estimates[index].distance_m } else { apart[index].length_m() }
+        };
+        self.order.clear();
+        self.order.extend(0..apart.len());
+        // A stable sort: ties stay with the lower index.
+        self.order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
+        for &index in &self.order {
+            let state = self.states[index + 1];
+            write((apart[index].length_m() - config.collision_distance_m) / config.distance_scale_m);
+            write(apart[index].bearing().turn_from(own.heading) / PI);
+            write(state.velocity.course().turn_from(own.heading) / PI);
+            write(state.velocity.speed_mps() / config.speed_scale_mps);
+            if has_estimates {
+                let estimate = self.estimates[index];
+                write((estimate.distance_m - config.collision_distance_m) / config.dcpa_scale_m);
+                write(estimate.time_s / config.tcpa_scale_s);
+            }
+        }
+    }
+
+    /// Moves on by one time step and notes what the world reports.
+    fn advance(&mut self, episode: &mut Episode, step: i64) {
+        episode.own.advance(self.traffic.dt_s);
+        Self::read_states(&mut self.states, episode, step);
+        for report in self.world.step(&self.states) {
+            episode.outcome.contact |= report.circles_touch();
+            episode.outcome.closest_m = episode.outcome.closest_m.min(report.min_centre_distance_m);
+        }
+    }
+}
+
+impl Env for Coastal {
+    fn observation_len(&self) -> usize {
+        let per_obstacle = if self.forecaster.is_some() { 6 } else { 4 };
+        2 + per_obstacle * (1 + self.config.linear_obstacles)
+    }
+
+    fn action_len(&self) -> usize {
+        1
+    }
+
+    fn max_decisions(&self) -> usize {
+        self.config.decisions
+    }
+
+    fn reset(&mut self, seed: u64, observation: &mut [f32]) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let traffic = Arc::clone(&self.traffic);
+        let state_of = |start: HeadOnStart| {
+            let replay = &traffic.replays[start.track];
+            (replay.track().positions[start.index], replay.track().velocity(start.index))
+        };
+        let opening = Opening::draw(&self.config, &traffic.starts, traffic.dt_s, state_of, &mut rng);
+        // Starts of every scenario asked for were there when the traffic was loaded.
+        let opening = opening.expect("a start of each scenario that is asked for");
+        let kinematic = KinematicConfig { max_turn_deg: self.config.head_on.turn_per_decision_deg };
+        let own = Kinematic::new(
+            kinematic,
+            opening.own_position,
+            opening.own_heading,
+            self.config.head_on.own_speed_mps,
+        );
+        let steps = self.config.decisions * self.steps_per_decision();
+        let vessels = 2 + self.config.linear_obstacles;
+        let noise = SensorNoise::draw(seed, vessels, self.config.history_positions, steps);
+        let outcome = Outcome {
+            kind: opening.kind,
+            contact: false,
+            contact_at_decision: false,
+            wrong_side: false,
+            closest_m: f64::INFINITY,
+        };
+        let recorded = traffic.replay(opening.start);
+        let episode = Episode { own, recorded, noise, decision: 0, outcome, opening };
+        Self::read_states(&mut self.states, &episode, 0);
+        self.world.reset(&self.states);
+        for term in &mut self.terms {
+            term.value = 0.0;
+        }
+        self.estimate(&episode);
+        self.observe(&episode, observation);
+        self.episode = Some(episode);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Result<Step, ActionError> {
+        check_action(action, 1)?;
+        let Some(mut episode) = self.episode.take_if(|episode| episode.decision < self.config.decisions)
+        else {
+            return Err(ActionError::EpisodeOver);
+        };
+        let turn_rad = f64::from(action[0].clamp(-1.0, 1.0)) * episode.own.max_turn_rad();
+        episode.own.order(Command { turn_rad, speed_mps: None });
+        let first = episode.step(self.steps_per_decision());
+        for step in 1..=self.steps_per_decision() as i64 {
+            self.advance(&mut episode, first + step);
+        }
+        episode.decision += 1;
+
+        let own = self.states[0].position;
+        let wrong_side = Self::cross_track_m(&episode.opening, own) >= self.config.cross_track_limit_m;
+        let within =
+            |state: &&VesselState| own.distance_m(state.position) <= self.config.collision_distance_m;
+        let too_close = self.states[1..].iter().filter(within).count();
+        episode.outcome.wrong_side |= wrong_side;
+        episode.outcome.contact_at_decision |= too_close > 0;
+        self.terms[0].value = if wrong_side { -1.0 } else { 0.0 };
+        self.terms[1].value = -(too_close as f64);
+
+        self.estimate(&episode);
+        self.observe(&episode, observation);
+        let truncated = episode.decision == self.config.decisions;
+        self.episode = Some(episode);
+        let reward = self.terms.iter().map(|term| term.value).sum();
+        Ok(Step { reward, terminated: false, truncated })
+    }
+
+    fn reward_terms(&self) -> &[RewardTerm] {
+        &self.terms
+    }
+}
+
+#[cfg(test)]
+mod tests;
