@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub mod ais;
+pub mod forecast;
 pub mod progress;
 pub mod scenario;
 pub mod table;
@@ -51,6 +52,8 @@ subcommands! {
     Ais(ais),
     /// List, check and run scripted encounters
     Scenario(scenario),
+    /// Train, measure and show forecasts of where vessels will go
+    Forecast(forecast),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
 }

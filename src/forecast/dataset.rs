@@ -68,7 +68,9 @@ impl SegmentSource for SyntheticSegments {
         let velocity = Vector2::from_fn(|_, _| rng.random_range(-limit..=limit));
         match self.process {
             Process::Stochastic(config) => {
-                self.follow(velocity, stochastic::Process::new(config, velocity), rng)
+                let process = stochastic::Process::new(config, velocity);
+                let innovation_m = config.beta * config.innovation_sd_m * velocity.norm() / config.v_max_mps;
+                Segment { noise_m: innovation_m, ..self.follow(velocity, process, rng) }
             }
             Process::Periodic(config) => {
                 let process = periodic::Process::new(config, velocity, rng);

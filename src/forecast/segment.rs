@@ -18,7 +18,8 @@ pub struct Segment {
     pub mmsi: Option<u32>,
     /// Time of the first position in seconds since 1970, where the path is a recorded one.
     pub start_unix_s: Option<f64>,
-    /// Standard deviation of the noise that was added to the history, in metres on each axis.
+    /// Standard deviation of what nobody can predict of it, in metres on each axis: of the noise that was added
+    /// to the history, or of the motion's own innovations; 0 where all segments are alike in this.
     pub noise_m: f64,
 }
 
