@@ -4,6 +4,7 @@ mod architecture;
 mod browser;
 mod cli;
 mod cpa;
+mod cpa_cli;
 mod forecast;
 mod forecast_network;
 mod nn_allocation;

@@ -31,7 +31,7 @@ pub use config::ImportConfig;
 pub use error::AisError;
 pub use format::ColumnMapping;
 pub use read::Progress;
-pub use read::time::iso_utc;
+pub use read::time::{TimeForm, iso_utc};
 pub use report::{
     BadRow, ClearedFields, Counts, FileReport, Intervals, MessageDrop, Messages, Reason, Report, Splits,
     TrackDrop, Tracks,

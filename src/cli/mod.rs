@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub mod ais;
+pub mod cpa;
 pub mod forecast;
 pub mod progress;
 pub mod scenario;
@@ -56,6 +57,8 @@ subcommands! {
     Forecast(forecast),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
+    /// Closest point of approach of two vessels: closed form, sampled and refined
+    Cpa(cpa),
 }
 
 /// Runs the program on a command line, its name first, and returns the exit code.

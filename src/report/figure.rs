@@ -61,6 +61,20 @@ pub struct Panel {
     pub equal_scales: bool,
     /// The vertical axis is logarithmic.
     pub logarithmic: bool,
+    /// The vertical axis spans the data only, also where that leaves zero out.
+    pub close_up: bool,
+    /// Where the legend stands.
+    pub legend: LegendPlace,
+}
+
+/// Where a legend stands, so that it covers no line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LegendPlace {
+    /// In the upper left corner.
+    #[default]
+    UpperLeft,
+    /// In the middle of the upper edge.
+    UpperMiddle,
 }
 
 /// Panels side by side, `columns` in a row.
@@ -123,7 +137,11 @@ impl Panel {
                 .map_err(failure)?;
             self.fill(chart)
         } else {
-            let (x, y) = if self.equal_scales { equal(x, y) } else { (x, y.padded()) };
+            let (x, y) = match (self.equal_scales, self.close_up) {
+                (true, _) => equal(x, y),
+                (false, true) => (x, y.widened()),
+                (false, false) => (x, y.padded()),
+            };
             let chart = chart.build_cartesian_2d(x.low..x.high, y.low..y.high).map_err(failure)?;
             self.fill(chart)
         }
@@ -151,7 +169,7 @@ impl Panel {
         for line in &self.lines {
             let (colour, width) = (line.colour, line.width);
             let series = if line.dotted {
-                let dots = line.points.iter().map(|&point| Circle::new(point, 2, colour.filled()));
+                let dots = line.points.iter().map(|&point| Circle::new(point, width, colour.filled()));
                 chart.draw_series(dots).map_err(failure)?
             } else {
                 let stroke = colour.stroke_width(width);
@@ -169,7 +187,10 @@ impl Panel {
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
                 .label_font(FONT)
-                .position(SeriesLabelPosition::UpperLeft)
+                .position(match self.legend {
+                    LegendPlace::UpperLeft => SeriesLabelPosition::UpperLeft,
+                    LegendPlace::UpperMiddle => SeriesLabelPosition::UpperMiddle,
+                })
                 .draw()
                 .map_err(failure)?;
         }
@@ -198,9 +219,14 @@ impl Range {
         Some(if range.high > range.low { range } else { Self { high: range.low + 1.0, ..range } })
     }
 
-    fn padded(self) -> Self {
+    fn widened(self) -> Self {
         let margin = 0.05 * (self.high - self.low);
-        Self { low: if self.low >= 0.0 { 0.0 } else { self.low - margin }, high: self.high + margin }
+        Self { low: self.low - margin, high: self.high + margin }
+    }
+
+    fn padded(self) -> Self {
+        let widened = self.widened();
+        Self { low: if self.low >= 0.0 { 0.0 } else { widened.low }, ..widened }
     }
 
     fn around(self, length: f64) -> Self {

@@ -1,0 +1,216 @@
+//! `searoom cpa`: the closest point of approach of two vessels, by all three methods.
+
+mod encounter;
+mod track_csv;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, ensure};
+use serde::Serialize;
+
+use self::encounter::Encounter;
+use self::track_csv::TrackName;
+use super::table::table;
+use crate::atomic_file;
+use crate::cpa::refined::{RefineConfig, RefinedCpa, Refiner};
+use crate::cpa::sampled::DistanceCurve;
+use crate::cpa::{Cpa, CpaConfig, StraightMotion, linear};
+use crate::report::figure::{Figure, LegendPlace, Line, Panel, colour};
+
+/// Steps either side of the sampled CPA in the close-up.
+const NEAR_STEPS: f64 = 3.0;
+/// Parts in which the close-up draws a step.
+const PARTS: u32 = 20;
+
+/// Closest point of approach of two vessels: closed form, sampled and refined
+///
+/// Own ship keeps the velocity it has at `--at`; the target ship goes where its track goes. The closed
+/// form takes the target ship's present velocity instead.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  searoom cpa own.csv target.csv --at 120
+  searoom cpa tracks.csv:3 tracks.csv:7 --smoothing 0 --plot smoothing_distance.svg
+
+A track is a CSV file with the columns north_m, east_m and time_s (or time_utc), as `searoom ais
+import` writes it. With several tracks in the file, :N picks number N of the column track.")]
+pub struct Args {
+    /// Own ship's track: FILE.csv or FILE.csv:N
+    own: TrackName,
+    /// The target ship's track
+    target: TrackName,
+    /// What is now, in seconds after the first time that both tracks cover
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    at: f64,
+    /// Average distances over this many steps either side; 0 suits recorded tracks
+    #[arg(long, value_name = "STEPS", default_value_t = CpaConfig::default().smoothing)]
+    smoothing: usize,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Draw raw and smoothed distance with both minima
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
+    let (own, target) = (track_csv::read(&args.own)?, track_csv::read(&args.target)?);
+    let encounter = Encounter::of_tracks(&own, &target, args.at)?;
+    let steps = encounter.target.len();
+    let width = 2 * args.smoothing + 1;
+    ensure!(
+        steps >= width,
+        "there are only {steps} time step(s), and --smoothing {} averages {width}: choose a smaller one",
+        args.smoothing
+    );
+    let results = Results::of(&encounter, args.smoothing);
+    if let Some(file) = &args.plot {
+        let svg =
+            results.figure().to_svg().map_err(anyhow::Error::from_boxed).context("cannot draw the figure")?;
+        atomic_file::write(file, |out| out.write_all(svg.as_bytes()))?;
+    }
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&results.summary(args.at))?)?;
+    } else {
+        results.print(out)?;
+        if let Some(file) = &args.plot {
+            writeln!(out, "figure: {}", file.display())?;
+        }
+    }
+    Ok(())
+}
+
+/// The CPA by all methods.
+struct Results {
+    closed_form: Cpa,
+    sampled: Cpa,
+    refined: RefinedCpa,
+    curve: DistanceCurve,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    at_s: f64,
+    smoothing_steps: usize,
+    dt_s: f64,
+    closed_form: Cpa,
+    sampled: Cpa,
+    refined: RefinedCpa,
+    closed_form_less_refined: Cpa,
+    sampled_less_refined: Cpa,
+}
+
+impl Results {
+    fn of(encounter: &Encounter, smoothing: usize) -> Self {
+        let mut curve = DistanceCurve::new(smoothing);
+        curve.fill(encounter.own, encounter.target.iter().copied(), encounter.now, encounter.dt_s);
+        let StraightMotion { position, velocity } = encounter.own;
+        let target = encounter.target[encounter.now];
+        Self {
+            closed_form: linear::closest_approach(position, velocity, target, encounter.target_velocity),
+            sampled: curve.closest(),
+            refined: Refiner::new(RefineConfig::default()).closest(&curve),
+            curve,
+        }
+    }
+
+    fn less_refined(&self, cpa: Cpa) -> Cpa {
+        let refined = self.refined.cpa;
+        Cpa { distance_m: cpa.distance_m - refined.distance_m, time_s: cpa.time_s - refined.time_s }
+    }
+
+    fn summary(&self, at_s: f64) -> Summary {
+        Summary {
+            at_s,
+            smoothing_steps: self.curve.half_width(),
+            dt_s: self.curve.dt_s(),
+            closed_form: self.closed_form,
+            sampled: self.sampled,
+            refined: self.refined,
+            closed_form_less_refined: self.less_refined(self.closed_form),
+            sampled_less_refined: self.less_refined(self.sampled),
+        }
+    }
+
+    fn print(&self, out: &mut dyn Write) -> anyhow::Result<()> {
+        let headings = ["method", "DCPA (m)", "TCPA (s)", "DCPA less refined (m)", "TCPA less refined (s)"];
+        let mut table = table(1, &headings);
+        let methods =
+            [("closed form", self.closed_form), ("sampled", self.sampled), ("refined", self.refined.cpa)];
+        for (name, cpa) in methods {
+            let difference = self.less_refined(cpa);
+            table.add_row([
+                name.to_owned(),
+                format!("{:.3}", cpa.distance_m),
+                format!("{:.2}", cpa.time_s),
+                format!("{:+.3}", difference.distance_m),
+                format!("{:+.2}", difference.time_s),
+            ]);
+        }
+        writeln!(out, "{table}")?;
+        let RefinedCpa { solves, fallbacks, .. } = self.refined;
+        writeln!(out, "cone programmes solved: {solves}, fallbacks to samples: {fallbacks}")?;
+        Ok(())
+    }
+
+    /// The paper's figure `smoothing_distance`, with the refined CPA beside the sampled one: the whole,
+    /// and the steps around the minimum, where the two differ.
+    fn figure(&self) -> Figure {
+        let curve = &self.curve;
+        let dots = |width, label: String, colour, points| Line { width, ..Line::dots(label, colour, points) };
+        let mark = |name: &str, cpa: Cpa, colour| {
+            let label = format!("{name}: {:.2} m at {:.2} s", cpa.distance_m, cpa.time_s);
+            dots(5, label, colour, vec![(cpa.time_s, cpa.distance_m)])
+        };
+        let marks = || {
+            [
+                mark("sampled CPA", self.sampled, colour::ORANGE),
+                mark("refined CPA", self.refined.cpa, colour::GREEN),
+            ]
+        };
+        let unnamed = |line: Line| Line { label: String::new(), ..line };
+        let raw = curve.raw_m().iter().enumerate().map(|(step, &m)| (curve.time_s(step), m)).collect();
+        let sampled: Vec<_> = curve
+            .smoothed_m()
+            .iter()
+            .enumerate()
+            .map(|(index, &m)| (curve.smoothed_time_s(index), m))
+            .collect();
+
+        let mut whole = vec![
+            Line { width: 1, ..Line::solid("distance", colour::GREY, raw) },
+            Line::solid("smoothed distance", colour::BLUE, sampled.clone()),
+        ];
+        whole.extend(marks().map(unnamed));
+
+        let near = |time_s: f64| (time_s - self.sampled.time_s).abs() <= NEAR_STEPS * curve.dt_s() + 1e-9;
+        let within = (0..sampled.len().saturating_sub(1))
+            .flat_map(|index| (0..=PARTS).map(move |part| (index, f64::from(part) / f64::from(PARTS))));
+        let smooth = within
+            .map(|(index, part)| {
+                (curve.smoothed_time_s(index) + part * curve.dt_s(), curve.smoothed_within_m(index, part))
+            })
+            .filter(|point| near(point.0))
+            .collect();
+        let steps = sampled.into_iter().filter(|point| near(point.0)).collect();
+        let mut closeup = vec![
+            unnamed(Line::solid("", colour::BLUE, smooth)),
+            dots(3, "time steps".to_owned(), colour::BLUE, steps),
+        ];
+        closeup.extend(marks());
+
+        let panel = |title: String, lines| Panel {
+            title,
+            x_label: "time from now (s)".to_owned(),
+            y_label: "distance (m)".to_owned(),
+            lines,
+            legend: LegendPlace::UpperMiddle,
+            ..Panel::default()
+        };
+        let smoothing = format!("Distance, smoothed over {} steps either side", curve.half_width());
+        let around = panel("Around the smallest smoothed distance".to_owned(), closeup);
+        Figure { panels: vec![panel(smoothing, whole), Panel { close_up: true, ..around }], columns: 2 }
+    }
+}
