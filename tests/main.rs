@@ -1,5 +1,7 @@
 //! Integration tests: one binary, one module per subject.
 
+#![allow(clippy::unwrap_used)]
+
 mod architecture;
 mod browser;
 mod cli;
