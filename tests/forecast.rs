@@ -11,7 +11,7 @@ struct Folder(tempfile::TempDir);
 
 impl Folder {
     fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        Self(tempfile::tempdir().expect("a folder"))
     }
 
     fn path(&self, name: &str) -> String {
@@ -26,7 +26,7 @@ impl Folder {
              [[training.stages]]\nsteps = 3\nbatch = 4\ncalls = 2\n"
         );
         let path = self.path("tiny.toml");
-        fs::write(&path, text).unwrap();
+        fs::write(&path, text).expect("a writable folder");
         path
     }
 
@@ -40,7 +40,7 @@ impl Folder {
 fn succeed(arguments: &[&str]) -> String {
     let output = searoom(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
-    String::from_utf8(output.stdout).unwrap()
+    String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 fn stderr(output: &Output) -> String {
