@@ -14,8 +14,8 @@ fn write_tracks(folder: &Path) {
         let turned_s = (time_s - 100.0).max(0.0);
         target += &format!("{time_s},{},{}\n", 2100.0 - 6.0 * (time_s - turned_s), 100.0 + 6.0 * turned_s);
     }
-    std::fs::write(folder.join("own.csv"), own).unwrap();
-    std::fs::write(folder.join("target.csv"), target).unwrap();
+    std::fs::write(folder.join("own.csv"), own).expect("the folder takes files");
+    std::fs::write(folder.join("target.csv"), target).expect("the folder takes files");
 }
 
 fn searoom(folder: &Path, arguments: &[&str]) -> Output {
@@ -80,4 +80,21 @@ fn wrong_input_is_met_with_what_to_do() {
         assert_eq!(output.status.code(), Some(1), "{text}");
         assert!(text.starts_with("error: ") && text.contains(expected), "{arguments:?}: {text}");
     }
+}
+
+#[test]
+fn a_scenario_and_a_time_do_as_well_as_two_tracks() {
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/overtaking.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let output =
+        searoom(folder.path(), &["--scenario", scenario, "--at", "30", "--smoothing", "0", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["refined"]["cpa"]["distance_m"].as_f64().unwrap() > 0.0);
+
+    let output = searoom(folder.path(), &["--scenario", scenario, "--ship", "Flying Dutchman"]);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("there is no target ship \"Flying Dutchman\"; its target ships: "), "{text}");
+    assert_eq!(searoom(folder.path(), &["--scenario", scenario, "own.csv"]).status.code(), Some(2));
+    assert_eq!(searoom(folder.path(), &["own.csv"]).status.code(), Some(2));
 }
