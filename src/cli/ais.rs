@@ -93,7 +93,7 @@ pub fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
             let set = ais::load_tracks(&dir)?;
             let drawn = map::draw(&set.tracks, &set.plane, &set.provenance.area);
             crate::atomic_file::write(&file, |svg| svg.write_all(drawn.as_bytes()))?;
-            writeln!(out, "{} tracks drawn on {}", set.tracks.len(), file.display())?;
+            writeln!(out, "{} drawn on {}", counted(set.tracks.len(), "track"), file.display())?;
             Ok(())
         }
     }
@@ -115,7 +115,13 @@ fn import(args: &ImportArgs, out: &mut dyn Write) -> anyhow::Result<()> {
         writeln!(out, "{}", serde_json::json!({ "messages": messages, "tracks": tracks }))?;
     } else {
         write_report(&import.report, out)?;
-        writeln!(out, "{} tracks of {} written to {}", import.tracks.len(), area.name, args.out.display())?;
+        writeln!(
+            out,
+            "{} of {} written to {}",
+            counted(import.tracks.len(), "track"),
+            area.name,
+            args.out.display()
+        )?;
     }
     warn(&import, &args.out)
 }
@@ -206,7 +212,11 @@ fn summary(dir: &Path, json: bool, out: &mut dyn Write) -> anyhow::Result<()> {
     let last = tracks.iter().map(|track| track.unix_s(track.positions.len() - 1) as i64).max();
     if let (Some(first), Some(last)) = (first, last) {
         let (first, last) = (ais::iso_utc(first), ais::iso_utc(last));
-        writeln!(out, "{} vessels from {first} to {last}", vessels.len())?;
+        writeln!(out, "{} from {first} to {last}", counted(vessels.len(), "vessel"))?;
     }
     Ok(())
+}
+
+fn counted(many: usize, what: &str) -> String {
+    format!("{many} {what}{}", if many == 1 { "" } else { "s" })
 }

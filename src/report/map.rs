@@ -10,7 +10,7 @@ use crate::track::Track;
 /// Largest width and height of the map itself, in pixels.
 const MAP_PX: (f64, f64) = (1040.0, 820.0);
 /// Space around it: left, top, right, bottom.
-const MARGIN_PX: (f64, f64, f64, f64) = (70.0, 74.0, 128.0, 62.0);
+const MARGIN_PX: (f64, f64, f64, f64) = (70.0, 74.0, 128.0, 74.0);
 /// Speeds from which each colour holds, in knots. From slow to fast the colours also darken.
 const COLOURS: [(f64, &str); 6] = [
     (0.0, "#9aa7b5"),
@@ -20,8 +20,10 @@ const COLOURS: [(f64, &str); 6] = [
     (15.0, "#dd4f2a"),
     (20.0, "#8a1656"),
 ];
-/// Way along a track between two arrows.
-const ARROW_EVERY_PX: f64 = 150.0;
+/// Least way along a track between two arrows.
+const ARROW_EVERY_PX: f64 = 110.0;
+/// About how many arrows a map carries; on a crowded one they stand farther apart.
+const ARROWS_AT_MOST: f64 = 220.0;
 /// Detail below this is left out, so that the file stays small.
 const DETAIL_PX: f64 = 0.35;
 /// Distances between lines of the graticule, in minutes of arc.
@@ -35,7 +37,11 @@ pub fn draw(tracks: &[Track], plane: &LocalPlane, area: &Area) -> String {
     let _ = writeln!(svg, r#"<g clip-path="url(#map)">"#);
     graticule(&mut svg, &frame, area, plane);
     outline(&mut svg, &frame, area, plane);
-    let paths: Vec<Drawn> = tracks.iter().map(|track| Drawn::of(track, &frame)).collect();
+    let way_px: f64 = tracks.iter().map(Track::path_length_m).sum::<f64>() * frame.px_per_m;
+    let arrow_every_px = ARROW_EVERY_PX.max(way_px / ARROWS_AT_MOST);
+    let mut until_arrow_px = arrow_every_px / 2.0;
+    let paths: Vec<Drawn> =
+        tracks.iter().map(|track| Drawn::of(track, &frame, arrow_every_px, &mut until_arrow_px)).collect();
     // Slow traffic below, so that the passages stay in sight.
     for colour in 0..COLOURS.len() {
         lines_of_colour(&mut svg, &paths, colour);
@@ -261,9 +267,9 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn of(track: &Track, frame: &Frame) -> Self {
+    /// The way to the next arrow runs on from track to track, so that short ones get their share.
+    fn of(track: &Track, frame: &Frame, arrow_every_px: f64, until_arrow_px: &mut f64) -> Self {
         let mut drawn = Self { points: Vec::new(), colours: Vec::new(), arrows: Vec::new() };
-        let mut since_arrow_px = ARROW_EVERY_PX / 2.0;
         let last = track.positions.len() - 1;
         for (index, &position) in track.positions.iter().enumerate() {
             let here = frame.px(position);
@@ -279,10 +285,10 @@ impl Drawn {
             let colour = colour_of(velocity.speed_mps());
             drawn.points.push(here);
             drawn.colours.push(colour);
-            since_arrow_px += step_px;
-            if since_arrow_px >= ARROW_EVERY_PX && velocity.speed_mps() > COLOURS[1].0 * MPS_PER_KNOT {
+            *until_arrow_px -= step_px;
+            if *until_arrow_px <= 0.0 && velocity.speed_mps() > COLOURS[1].0 * MPS_PER_KNOT {
                 drawn.arrows.push((here, velocity.course(), colour));
-                since_arrow_px = 0.0;
+                *until_arrow_px = arrow_every_px;
             }
         }
         drawn
@@ -334,21 +340,17 @@ fn scale_bar(svg: &mut String, frame: &Frame) {
     };
     let nmi = round(widest_nmi);
     let length_px = nmi * M_PER_NMI * frame.px_per_m;
-    let (x, y) = (frame.right_px() - length_px - 20.0, frame.bottom_px() - 24.0);
+    let (x, y) = (frame.right_px() - length_px, frame.bottom_px() + 52.0);
     let half = length_px / 2.0;
     let km = nmi * M_PER_NMI / 1000.0;
     let _ = writeln!(
         svg,
-        r##"<g><rect x="{:.1}" y="{:.1}" width="{:.1}" height="46" rx="4" fill="#ffffff" fill-opacity="0.85"/>
-<rect x="{x:.1}" y="{y:.1}" width="{half:.1}" height="6" fill="#24323f"/>
+        r##"<g><rect x="{x:.1}" y="{y:.1}" width="{half:.1}" height="6" fill="#24323f"/>
 <rect x="{:.1}" y="{y:.1}" width="{half:.1}" height="6" fill="#ffffff" stroke="#24323f"/>
-<text x="{:.1}" y="{:.1}" text-anchor="middle">{nmi} nmi ({km:.1} km)</text></g>"##,
-        x - 12.0,
-        y - 26.0,
-        length_px + 24.0,
+<text x="{:.1}" y="{:.1}" text-anchor="end">{nmi} nmi ({km:.1} km)</text></g>"##,
         x + half,
-        x + half,
-        y - 8.0,
+        x - 10.0,
+        y + 8.0,
     );
 }
 
