@@ -14,4 +14,5 @@ mod nn_allocation;
 mod replay;
 mod rl;
 mod scenario;
+mod train;
 mod vessel;

@@ -9,12 +9,16 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod agent_run;
 pub mod ais;
 pub mod cpa;
+pub mod evaluate;
 pub mod forecast;
 pub mod progress;
+mod run_log;
 pub mod scenario;
 pub mod table;
+pub mod train;
 pub mod vessel;
 
 #[derive(Debug, Parser)]
@@ -55,6 +59,10 @@ subcommands! {
     Scenario(scenario),
     /// Train, measure and show forecasts of where vessels will go
     Forecast(forecast),
+    /// Train an agent to keep clear, with checkpoints that resume
+    Train(train),
+    /// The return of a trained agent on episodes that it never saw
+    Evaluate(evaluate),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
     /// Closest point of approach of two vessels: closed form, sampled and refined

@@ -1,0 +1,105 @@
+//! `searoom train` and `searoom evaluate`: a run can be killed and resumed, and bad input is told.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::Duration;
+
+fn searoom(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_searoom"));
+    command.current_dir(folder).args(arguments);
+    command
+}
+
+fn output(folder: &Path, arguments: &[&str]) -> Output {
+    searoom(folder, arguments).output().unwrap()
+}
+
+/// Small networks, short episodes, an update from step 50 on.
+const CONFIG: &str = "\
+env = \"open-water\"
+estimates = false
+
+[open_water]
+decisions = 40
+
+[trainer]
+random_steps = 50
+evaluate_every = 100
+evaluation_episodes = 2
+
+[trainer.agent]
+hidden = 16
+";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("run.toml"), CONFIG).unwrap();
+    folder
+}
+
+const TRAIN: [&str; 7] = ["train", "--config", "run.toml", "--out", "run", "--checkpoint-every", "20"];
+
+fn text(output: &Output) -> (String, String) {
+    let read = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (read(&output.stdout), read(&output.stderr))
+}
+
+#[test]
+fn a_run_trains_is_evaluated_and_is_not_overwritten() {
+    let folder = folder();
+    let trained = output(folder.path(), &[&TRAIN[..], &["--steps", "200"]].concat());
+    assert!(trained.status.success(), "{:?}", text(&trained));
+    assert!(text(&trained).0.starts_with("finished at 200 of 200 decisions"), "{:?}", text(&trained));
+    let evaluations = fs::read_to_string(folder.path().join("run/evaluations.csv")).unwrap();
+    assert_eq!(evaluations.lines().count(), 3, "{evaluations}");
+
+    let evaluated = output(folder.path(), &["evaluate", "run", "--episodes", "3", "--json"]);
+    let outcome: serde_json::Value = serde_json::from_str(&text(&evaluated).0).unwrap();
+    assert_eq!(outcome["episodes"], 3);
+    assert!(outcome["mean_return"].as_f64().unwrap() <= 0.0);
+
+    let again = output(folder.path(), &[&TRAIN[..], &["--steps", "200"]].concat());
+    assert!(!again.status.success());
+    assert!(text(&again).1.contains("has a run already"), "{:?}", text(&again));
+}
+
+/// Killed at any moment, a run goes on from its last checkpoint to the very weights of a run that was
+/// never stopped.
+#[test]
+fn a_killed_run_resumes_to_the_same_weights() {
+    let (straight, killed) = (folder(), folder());
+    let arguments = [&TRAIN[..], &["--steps", "400"]].concat();
+    assert!(output(straight.path(), &arguments).status.success());
+
+    let checkpoint = killed.path().join("run/checkpoint.safetensors");
+    let mut child = searoom(killed.path(), &arguments).spawn().unwrap();
+    while !checkpoint.exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+
+    let resumed = output(killed.path(), &["train", "--resume", "run", "--checkpoint-every", "20"]);
+    assert!(resumed.status.success(), "{:?}", text(&resumed));
+    for file in ["run/checkpoint.safetensors", "run/policy.safetensors", "run/evaluations.csv"] {
+        let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
+        assert!(ours == theirs, "{file} differs");
+    }
+}
+
+#[test]
+fn what_is_no_run_is_told_with_a_remedy() {
+    let folder = folder();
+    let evaluated = output(folder.path(), &["evaluate", "nowhere"]);
+    assert!(!evaluated.status.success());
+    assert!(
+        text(&evaluated).1.contains("give the folder that `searoom train` wrote"),
+        "{:?}",
+        text(&evaluated)
+    );
+
+    fs::write(folder.path().join("run.toml"), "stepps = 3\n").unwrap();
+    let trained = output(folder.path(), &TRAIN);
+    assert!(text(&trained).1.contains("run.toml:1"), "{:?}", text(&trained));
+}
