@@ -1,10 +1,13 @@
-//! Two vessels on one grid of times.
+//! Two vessels on one grid of times, from two tracks or from a scenario.
 
-use anyhow::ensure;
+use std::path::Path;
+
+use anyhow::{anyhow, ensure};
 use nalgebra::Vector2;
 
 use super::track_csv::TimedTrack;
 use crate::cpa::StraightMotion;
+use crate::scenario::ScenarioFile;
 
 /// Own ship now, and where the target ship is over time.
 pub(super) struct Encounter {
@@ -40,6 +43,29 @@ impl Encounter {
             target: times.iter().map(|&time| target.position_at(time)).collect(),
             now,
             dt_s: own.dt_s,
+        })
+    }
+
+    /// Own ship and a target ship of a scenario, the first where none is named.
+    pub fn of_scenario(file: &Path, name: Option<&str>, at_s: f64) -> anyhow::Result<Self> {
+        let episode = ScenarioFile::load(file)?.set_up()?.run();
+        let targets: Vec<&str> = episode.vessels.iter().skip(1).map(|vessel| vessel.name.as_str()).collect();
+        let index =
+            targets.iter().position(|target| name.is_none_or(|name| name == *target)).ok_or_else(|| {
+                let there = if targets.is_empty() { "none".to_owned() } else { targets.join(", ") };
+                let wanted =
+                    name.map_or_else(|| "target ship".to_owned(), |name| format!("target ship \"{name}\""));
+                anyhow!("{}: there is no {wanted}; its target ships: {there}", file.display())
+            })?;
+        let vessel = index + 1;
+        let now = step_of(at_s, episode.dt_s, episode.steps.len() - 1)?;
+        let present = &episode.steps[now].vessels;
+        Ok(Self {
+            own: StraightMotion { position: present[0].position.xy(), velocity: present[0].velocity.xy() },
+            target_velocity: present[vessel].velocity.xy(),
+            target: episode.steps.iter().map(|step| step.vessels[vessel].position.xy()).collect(),
+            now,
+            dt_s: episode.dt_s,
         })
     }
 }

@@ -6,7 +6,7 @@ mod track_csv;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use serde::Serialize;
 
 use self::encounter::Encounter;
@@ -32,15 +32,24 @@ const PARTS: u32 = 20;
 Examples:
   searoom cpa own.csv target.csv --at 120
   searoom cpa tracks.csv:3 tracks.csv:7 --smoothing 0 --plot smoothing_distance.svg
+  searoom cpa --scenario scenarios/head_on.toml --at 60
 
 A track is a CSV file with the columns north_m, east_m and time_s (or time_utc), as `searoom ais
 import` writes it. With several tracks in the file, :N picks number N of the column track.")]
 pub struct Args {
     /// Own ship's track: FILE.csv or FILE.csv:N
-    own: TrackName,
+    #[arg(required_unless_present = "scenario")]
+    own: Option<TrackName>,
     /// The target ship's track
-    target: TrackName,
-    /// What is now, in seconds after the first time that both tracks cover
+    #[arg(required_unless_present = "scenario")]
+    target: Option<TrackName>,
+    /// Take both vessels from a scenario instead, run under its own policy
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["own", "target"])]
+    scenario: Option<PathBuf>,
+    /// The scenario's target ship to look at, by name [default: the first]
+    #[arg(long, value_name = "NAME", requires = "scenario")]
+    ship: Option<String>,
+    /// What is now, in seconds after the start of the scenario or the first time both tracks cover
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
     /// Average distances over this many steps either side; 0 suits recorded tracks
@@ -56,8 +65,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
-    let (own, target) = (track_csv::read(&args.own)?, track_csv::read(&args.target)?);
-    let encounter = Encounter::of_tracks(&own, &target, args.at)?;
+    let encounter = match (&args.own, &args.target, &args.scenario) {
+        (Some(own), Some(target), _) => {
+            Encounter::of_tracks(&track_csv::read(own)?, &track_csv::read(target)?, args.at)?
+        }
+        (_, _, Some(file)) => Encounter::of_scenario(file, args.ship.as_deref(), args.at)?,
+        _ => bail!("name two tracks or a scenario"),
+    };
     let steps = encounter.target.len();
     let width = 2 * args.smoothing + 1;
     ensure!(
