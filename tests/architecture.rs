@@ -72,10 +72,13 @@ fn only_the_refined_cpa_names_the_cone_solver() {
 }
 
 #[test]
-fn networks_know_no_ships() {
+fn networks_and_learning_know_no_ships() {
     let ships =
         ["track", "ais", "vessel", "world", "cpa", "forecast", "scenario", "policy", "episode", "geo"];
-    for source in sources().into_iter().filter(|source| source.path.starts_with("nn/")) {
+    for source in sources()
+        .into_iter()
+        .filter(|source| source.path.starts_with("nn/") || source.path.starts_with("rl/"))
+    {
         for module in ships {
             let path = format!("crate::{module}");
             assert!(!source.code.contains(&path), "src/{} uses {path}", source.path);
