@@ -25,6 +25,8 @@ pub mod scenario;
 
 pub mod episode;
 
+pub mod experiment;
+
 pub mod atomic_file;
 pub mod cli;
 pub mod config;
