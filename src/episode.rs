@@ -10,6 +10,7 @@ use crate::angle::Nautical;
 use crate::cpa::{Cpa, linear};
 use crate::encounter::{Encounter, EncounterConfig, Vantage, classify};
 use crate::geo::{Geodetic, Position, Velocity};
+use crate::world::{self, PairReport, VesselBody};
 
 /// One encounter from start to end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +50,26 @@ pub struct VesselInfo {
     pub hull: Vec<HullPoint>,
     /// Radius of its collision circle, in metres.
     pub collision_radius_m: f64,
+}
+
+impl VesselInfo {
+    /// A vessel with this body; `motion` says in a word or two how it moves.
+    #[must_use]
+    pub fn new(name: &str, role: VesselRole, motion: &str, body: &VesselBody) -> Self {
+        let corner = |point: &world::HullPoint| HullPoint {
+            forward_m: point.forward_m,
+            starboard_m: point.starboard_m,
+        };
+        Self {
+            name: name.to_owned(),
+            role,
+            motion: motion.to_owned(),
+            length_m: body.hull.length_m(),
+            beam_m: body.hull.beam_m(),
+            hull: body.hull.points().iter().map(corner).collect(),
+            collision_radius_m: body.collision_radius_m,
+        }
+    }
 }
 
 /// Which side of the encounter a vessel is on.
@@ -126,6 +147,21 @@ pub struct PairStep {
     pub circle_contact_time_s: Option<f64>,
     /// As `circle_contact_time_s`, for the hulls.
     pub hull_contact_time_s: Option<f64>,
+}
+
+impl From<&PairReport> for PairStep {
+    /// Of a pair whose first vessel is own ship.
+    fn from(report: &PairReport) -> Self {
+        Self {
+            centre_distance_m: report.centre_distance_m,
+            hull_distance_m: report.hull_distance_m,
+            closest_centre_m: report.min_centre_distance_m,
+            closest_centre_time_s: report.min_centre_time_s,
+            closest_hull_m: report.min_hull_distance_m,
+            circle_contact_time_s: report.circle_contact_time_s,
+            hull_contact_time_s: report.hull_contact_time_s,
+        }
+    }
 }
 
 /// What came of the encounter with one target ship.

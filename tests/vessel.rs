@@ -90,6 +90,7 @@ fn tankers_head_on(policy: &mut dyn Policy) -> (f64, f64) {
                 position: target.position,
                 velocity: target.velocity,
                 history: &[],
+                forecast: None,
                 collision_distance_m: 1000.0,
             }];
             own.order(policy.decide(&Situation {

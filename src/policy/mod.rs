@@ -43,6 +43,9 @@ pub struct TargetShip<'a> {
     pub velocity: Velocity,
     /// The latest positions as sensed, one per time step, oldest first, the present one last.
     pub history: &'a [Position],
+    /// Where it is expected to go, one position per time step, the next one first; nothing where there is
+    /// no forecast of it.
+    pub forecast: Option<&'a [Position]>,
     /// The distance between centres that counts as contact with own ship, in metres.
     pub collision_distance_m: f64,
 }

@@ -119,6 +119,7 @@ mod tests {
                         position: target.position(step),
                         velocity: target.velocity(),
                         history: &[],
+                        forecast: None,
                         collision_distance_m: 300.0,
                     })
                     .collect();

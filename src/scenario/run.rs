@@ -3,11 +3,11 @@
 use super::model::Scenario;
 use super::setup::StagedEncounter;
 use super::streams::PositionSensor;
-use crate::episode::{Episode, HullPoint, PairStep, Step, VesselInfo, VesselRole, VesselStep};
+use crate::episode::{Episode, PairStep, Step, VesselInfo, VesselRole, VesselStep};
 use crate::geo::Position;
 use crate::policy::{self, HoldCourse, OwnShip, Policy, Situation, TargetShip};
 use crate::vessel::{Kinematic, KinematicConfig, Linear, Motion, Steered, VesselState};
-use crate::world::{PairReport, VesselBody, VesselId, World, WorldConfig};
+use crate::world::{VesselId, World, WorldConfig};
 
 impl StagedEncounter {
     /// Runs the encounter under the scenario's own policy.
@@ -44,11 +44,10 @@ impl StagedEncounter {
     }
 
     fn episode(&self, policy: &str, steps: Vec<Step>) -> Episode {
-        let own = vessel_info(&self.scenario.own_ship.name, VesselRole::Own, "kinematic", &self.own_body);
-        let targets = self
-            .targets
-            .iter()
-            .map(|target| vessel_info(&target.name, VesselRole::Target, target.motion_word, &target.body));
+        let own = VesselInfo::new(&self.scenario.own_ship.name, VesselRole::Own, "kinematic", &self.own_body);
+        let targets = self.targets.iter().map(|target| {
+            VesselInfo::new(&target.name, VesselRole::Target, target.motion_word, &target.body)
+        });
         Episode {
             scenario: self.scenario.name.clone(),
             description: self.description().to_owned(),
@@ -59,22 +58,6 @@ impl StagedEncounter {
             vessels: std::iter::once(own).chain(targets).collect(),
             steps,
         }
-    }
-}
-
-fn vessel_info(name: &str, role: VesselRole, motion: &str, body: &VesselBody) -> VesselInfo {
-    let corner = |point: &crate::world::HullPoint| HullPoint {
-        forward_m: point.forward_m,
-        starboard_m: point.starboard_m,
-    };
-    VesselInfo {
-        name: name.to_owned(),
-        role,
-        motion: motion.to_owned(),
-        length_m: body.hull.length_m(),
-        beam_m: body.hull.beam_m(),
-        hull: body.hull.points().iter().map(corner).collect(),
-        collision_radius_m: body.collision_radius_m,
     }
 }
 
@@ -129,6 +112,7 @@ impl<'s> Voyage<'s> {
                 position: self.sensed(vessel),
                 velocity: self.states[vessel].velocity,
                 history: &self.observed[vessel],
+                forecast: None,
                 collision_distance_m: self.staged.own_body.collision_radius_m
                     + self.staged.targets[vessel - 1].body.collision_radius_m,
             })
@@ -179,7 +163,7 @@ impl<'s> Voyage<'s> {
             observed: noisy.then(|| self.sensed(vessel)),
             ahead: Vec::new(),
         });
-        Step { vessels: vessels.collect(), pairs: self.world.reports().iter().map(pair_step).collect() }
+        Step { vessels: vessels.collect(), pairs: self.world.reports().iter().map(PairStep::from).collect() }
     }
 }
 
@@ -197,18 +181,6 @@ fn past(staged: &StagedEncounter) -> Vec<Vec<Position>> {
             positions
         })
         .collect()
-}
-
-fn pair_step(report: &PairReport) -> PairStep {
-    PairStep {
-        centre_distance_m: report.centre_distance_m,
-        hull_distance_m: report.hull_distance_m,
-        closest_centre_m: report.min_centre_distance_m,
-        closest_centre_time_s: report.min_centre_time_s,
-        closest_hull_m: report.min_hull_distance_m,
-        circle_contact_time_s: report.circle_contact_time_s,
-        hull_contact_time_s: report.hull_contact_time_s,
-    }
 }
 
 #[cfg(test)]

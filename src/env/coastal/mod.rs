@@ -30,12 +30,15 @@
 //! | `too_close` | minus the number of obstacles within 300 m |
 
 mod config;
+mod paths;
+mod record;
+mod situation;
 mod traffic;
 
 pub use config::{CoastalConfig, EstimateSource, ScenarioChoice};
+pub use paths::{KnownPaths, LivePaths, Moment, Path, PathSource};
 pub use traffic::{Opening, SensorNoise};
 
-use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -46,7 +49,7 @@ use thiserror::Error;
 use super::{ActionError, Env, RewardTerm, Step, check_action};
 use crate::cpa::linear::closest_approach;
 use crate::cpa::{Cpa, CpaConfig, Estimator, StraightMotion};
-use crate::forecast::{Forecaster, Forecasts};
+use crate::forecast::{Basis, Forecaster};
 use crate::geo::Position;
 use crate::scenario::encounter_starts::{HeadOnKind, HeadOnStart, HeadOnStarts};
 use crate::track::Track;
@@ -141,24 +144,29 @@ pub struct Outcome {
 pub struct Coastal {
     config: CoastalConfig,
     traffic: Arc<RecordedTraffic>,
-    forecaster: Option<Box<dyn Forecaster>>,
+    paths: Option<Box<dyn PathSource>>,
     estimator: Estimator,
-    /// Forecasts without noise depend on the track alone and are kept.
-    known_paths: HashMap<(usize, usize), Arc<[Position]>>,
-    forecasts: Forecasts,
     world: World,
     episode: Option<Episode>,
     states: Vec<VesselState>,
+    /// Where the recorded vessel was last expected to go, and the time step at which.
+    ahead: Option<(i64, Arc<[Position]>)>,
     estimates: Vec<Cpa>,
     order: Vec<usize>,
     terms: [RewardTerm; 2],
     fallbacks: u64,
+    body: VesselBody,
+    /// Every time step since the start, where they are kept.
+    kept_steps: Option<Vec<record::Step>>,
 }
 
 /// The episode under way.
 struct Episode {
+    seed: u64,
     opening: Opening,
     own: Kinematic,
+    /// Where own ship has been, from the start on.
+    own_path: Vec<Position>,
     recorded: Recorded,
     noise: SensorNoise,
     decision: usize,
@@ -169,6 +177,19 @@ impl Episode {
     /// Time steps since the start.
     fn step(&self, steps_per_decision: usize) -> i64 {
         (self.decision * steps_per_decision) as i64
+    }
+
+    /// The true position of a vessel at a time step that is not in the future. Before the start own ship
+    /// came straight on.
+    fn position(&self, vessel: usize, step: i64) -> Position {
+        match vessel {
+            0 => match usize::try_from(step) {
+                Ok(step) => self.own_path[step],
+                Err(_) => self.opening.own_before.position(step),
+            },
+            1 => self.recorded.position(step),
+            _ => self.opening.linear[vessel - 2].position(step),
+        }
     }
 }
 
@@ -184,6 +205,21 @@ impl Coastal {
         traffic: Arc<RecordedTraffic>,
         forecaster: Option<Box<dyn Forecaster>>,
     ) -> Result<Self, CoastalError> {
+        let noise_free = config.noise_m == 0.0;
+        let live = |forecaster| -> Box<dyn PathSource> { Box::new(LivePaths::new(forecaster, noise_free)) };
+        Self::with_paths(config, traffic, forecaster.map(live))
+    }
+
+    /// The environment with forecasts from any source; without one the observation is the baseline's.
+    ///
+    /// # Errors
+    ///
+    /// When the configured hull is none.
+    pub fn with_paths(
+        config: CoastalConfig,
+        traffic: Arc<RecordedTraffic>,
+        paths: Option<Box<dyn PathSource>>,
+    ) -> Result<Self, CoastalError> {
         let body = VesselBody {
             hull: Hull::new(config.vessel_length_m, config.vessel_beam_m, Bow::default())?,
             collision_radius_m: config.collision_distance_m / 2.0,
@@ -198,12 +234,11 @@ impl Coastal {
         Ok(Self {
             estimator: Estimator::new(&CpaConfig { smoothing: 0, ..CpaConfig::default() }),
             traffic,
-            forecaster,
-            known_paths: HashMap::new(),
-            forecasts: Forecasts::new(),
+            paths,
             world,
             episode: None,
             states: Vec::new(),
+            ahead: None,
             estimates: vec![Cpa::UNKNOWN; obstacles],
             order: Vec::new(),
             terms: [
@@ -211,6 +246,8 @@ impl Coastal {
                 RewardTerm { name: "too_close", value: 0.0 },
             ],
             fallbacks: 0,
+            body,
+            kept_steps: None,
             config,
         })
     }
@@ -266,8 +303,34 @@ impl Coastal {
         position + episode.noise.at(vessel, step) * self.config.noise_m
     }
 
+    /// The latest positions of a vessel as sensed, oldest first, the present one last.
+    fn sensed_history(&self, episode: &Episode, vessel: usize, step: i64) -> Vec<Position> {
+        let first = step + 1 - self.config.history_positions as i64;
+        (first..=step).map(|k| self.sensed(episode, vessel, k, episode.position(vessel, k))).collect()
+    }
+
+    /// The moments of an episode at which the recorded vessel is forecast, with its history as sensed.
+    /// They do not depend on what own ship does.
+    #[must_use]
+    pub fn forecast_moments(&self, seed: u64) -> Vec<(Moment, Vec<Position>)> {
+        let episode = self.draw(seed);
+        (0..=self.config.decisions)
+            .step_by(self.config.forecast_every_decisions.max(1))
+            .map(|decision| {
+                let step = (decision * self.steps_per_decision()) as i64;
+                (self.moment(&episode, decision), self.sensed_history(&episode, 1, step))
+            })
+            .collect()
+    }
+
+    fn moment(&self, episode: &Episode, decision: usize) -> Moment {
+        let HeadOnStart { track, index, .. } = episode.opening.start;
+        let sample = (track, index + decision * self.steps_per_decision());
+        Moment { seed: episode.seed, decision, sample }
+    }
+
     fn estimate(&mut self, episode: &Episode) {
-        if self.forecaster.is_none() {
+        if self.paths.is_none() {
             return;
         }
         let step = episode.step(self.steps_per_decision());
@@ -289,19 +352,17 @@ impl Coastal {
 
     /// The CPA with the recorded vessel: observed positions and those that follow in one row.
     fn estimate_recorded(&mut self, episode: &Episode, step: i64, own: StraightMotion) -> Cpa {
-        let length = self.config.history_positions as i64;
-        let history: Vec<Position> = (step + 1 - length..=step)
-            .map(|k| self.sensed(episode, 1, k, episode.recorded.position(k)))
-            .collect();
+        let history = self.sensed_history(episode, 1, step);
         let path = match self.config.estimates {
             EstimateSource::Truth => {
                 let (_, last) = episode.recorded.covered_steps();
                 let last = last.min(step + self.config.forecast_steps as i64);
                 Some((step + 1..=last).map(|k| episode.recorded.position(k)).collect())
             }
-            EstimateSource::Forecast => self.forecast(episode, step, &history),
+            EstimateSource::Forecast => self.forecast(episode, &history),
         };
-        let Some(path) = path else {
+        self.ahead = path.map(|path| (step, path));
+        let Some((_, path)) = &self.ahead else {
             // Fewer than two finite positions: the present course and speed stand in.
             self.fallbacks += 1;
             let position = self.sensed(episode, 1, step, self.states[1].position).xy();
@@ -312,21 +373,11 @@ impl Coastal {
         self.estimator.estimate(own, row, now, self.traffic.dt_s).cpa
     }
 
-    fn forecast(&mut self, episode: &Episode, step: i64, history: &[Position]) -> Option<Arc<[Position]>> {
-        let start = episode.opening.start;
-        let key = (start.track, start.index + step as usize);
-        let is_known_once = self.config.noise_m == 0.0;
-        if let Some(path) = self.known_paths.get(&key).filter(|_| is_known_once) {
-            return Some(Arc::clone(path));
-        }
-        let forecaster = self.forecaster.as_mut()?;
-        forecaster.forecast(&[history], self.config.forecast_steps, &mut self.forecasts).ok()?;
-        self.fallbacks += self.forecasts.fallbacks() as u64;
-        let path: Arc<[Position]> = self.forecasts.path(0).into();
-        if is_known_once {
-            self.known_paths.insert(key, Arc::clone(&path));
-        }
-        Some(path)
+    fn forecast(&mut self, episode: &Episode, history: &[Position]) -> Option<Arc<[Position]>> {
+        let moment = self.moment(episode, episode.decision);
+        let path = self.paths.as_mut()?.path(moment, history, self.config.forecast_steps)?;
+        self.fallbacks += u64::from(path.basis != Basis::Model);
+        Some(path.positions)
     }
 
     fn observe(&mut self, episode: &Episode, observation: &mut [f32]) {
@@ -346,7 +397,7 @@ impl Coastal {
         let apart: Vec<_> = (1..self.states.len())
             .map(|vessel| self.sensed(episode, vessel, step, self.states[vessel].position) - own_position)
             .collect();
-        let has_estimates = self.forecaster.is_some();
+        let has_estimates = self.paths.is_some();
         let key = |index: usize| {
             if has_estimates { self.estimates[index].distance_m } else { apart[index].length_m() }
         };
@@ -368,34 +419,10 @@ impl Coastal {
         }
     }
 
-    /// Moves on by one time step and notes what the world reports.
-    fn advance(&mut self, episode: &mut Episode, step: i64) {
-        episode.own.advance(self.traffic.dt_s);
-        Self::read_states(&mut self.states, episode, step);
-        for report in self.world.step(&self.states) {
-            episode.outcome.contact |= report.circles_touch();
-            episode.outcome.closest_m = episode.outcome.closest_m.min(report.min_centre_distance_m);
-        }
-    }
-}
-
-impl Env for Coastal {
-    fn observation_len(&self) -> usize {
-        let per_obstacle = if self.forecaster.is_some() { 6 } else { 4 };
-        2 + per_obstacle * (1 + self.config.linear_obstacles)
-    }
-
-    fn action_len(&self) -> usize {
-        1
-    }
-
-    fn max_decisions(&self) -> usize {
-        self.config.decisions
-    }
-
-    fn reset(&mut self, seed: u64, observation: &mut [f32]) {
+    /// An episode at its start.
+    fn draw(&self, seed: u64) -> Episode {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let traffic = Arc::clone(&self.traffic);
+        let traffic = &self.traffic;
         let state_of = |start: HeadOnStart| {
             let replay = &traffic.replays[start.track];
             (replay.track().positions[start.index], replay.track().velocity(start.index))
@@ -421,7 +448,40 @@ impl Env for Coastal {
             closest_m: f64::INFINITY,
         };
         let recorded = traffic.replay(opening.start);
-        let episode = Episode { own, recorded, noise, decision: 0, outcome, opening };
+        let own_path = vec![opening.own_position];
+        Episode { seed, own, own_path, recorded, noise, decision: 0, outcome, opening }
+    }
+
+    /// Moves on by one time step and notes what the world reports.
+    fn advance(&mut self, episode: &mut Episode, step: i64) {
+        episode.own.advance(self.traffic.dt_s);
+        episode.own_path.push(episode.own.state().position);
+        Self::read_states(&mut self.states, episode, step);
+        for report in self.world.step(&self.states) {
+            episode.outcome.contact |= report.circles_touch();
+            episode.outcome.closest_m = episode.outcome.closest_m.min(report.min_centre_distance_m);
+        }
+        self.keep_step(episode, step);
+    }
+}
+
+impl Env for Coastal {
+    fn observation_len(&self) -> usize {
+        let per_obstacle = if self.paths.is_some() { 6 } else { 4 };
+        2 + per_obstacle * (1 + self.config.linear_obstacles)
+    }
+
+    fn action_len(&self) -> usize {
+        1
+    }
+
+    fn max_decisions(&self) -> usize {
+        self.config.decisions
+    }
+
+    fn reset(&mut self, seed: u64, observation: &mut [f32]) {
+        let episode = self.draw(seed);
+        self.ahead = None;
         Self::read_states(&mut self.states, &episode, 0);
         self.world.reset(&self.states);
         for term in &mut self.terms {
@@ -429,6 +489,10 @@ impl Env for Coastal {
         }
         self.estimate(&episode);
         self.observe(&episode, observation);
+        if let Some(steps) = &mut self.kept_steps {
+            steps.clear();
+        }
+        self.keep_step(&episode, 0);
         self.episode = Some(episode);
     }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::angle::Nautical;
 use crate::forecast::LinearForecaster;
 use crate::geo::{Displacement, Velocity};
+use crate::policy::{Policy, Situation};
 use crate::track::VesselParticulars;
 
 /// A vessel at 10 m/s towards north for `straight_s`, then turning to port for a while.
@@ -167,6 +168,134 @@ fn noise_touches_features_and_never_rewards_or_the_episode() {
     assert_eq!(noisy, episode(&mut noisy_env, 11, 0.2), "the same noise every time");
     let other = episode(&mut noisy_env, 11, -0.2);
     assert_eq!(other[0], noisy[0], "noise does not depend on the policy");
+}
+
+/// Forecasts that were made beforehand, in one batch, are those made at the moment.
+#[test]
+fn known_paths_give_the_observations_of_live_ones() {
+    let config = CoastalConfig { noise_m: 10.0, ..CoastalConfig::default() };
+    let mut live = env(config.clone(), true);
+    let moments: Vec<_> = (0..3).flat_map(|seed| live.forecast_moments(seed)).collect();
+    assert_eq!(moments.len(), 3 * 8);
+    let mut forecaster = LinearForecaster::over(75);
+    let paths = KnownPaths::forecast(&mut forecaster, &moments, config.forecast_steps).unwrap();
+    let paths: KnownPaths = paths.into_iter().collect();
+    let traffic = traffic(&config);
+    let mut shared = Coastal::with_paths(config, traffic, Some(Box::new(paths))).unwrap();
+    for seed in 0..3 {
+        assert_eq!(episode(&mut live, seed, 0.4), episode(&mut shared, seed, 0.4));
+    }
+    assert_eq!(shared.fallbacks(), 0);
+    // Of an episode that nobody forecast nothing is known.
+    episode(&mut shared, 3, 0.4);
+    assert_eq!(shared.fallbacks(), 8);
+}
+
+/// Keeps what it was shown, and turns to starboard at every decision.
+#[derive(Debug, Default)]
+struct Recorder {
+    own: Vec<Vec<Position>>,
+    target: Vec<Vec<Position>>,
+    forecast: Vec<Option<Vec<Position>>>,
+}
+
+impl Policy for Recorder {
+    fn name(&self) -> &str {
+        "recorder"
+    }
+
+    fn reset(&mut self, _seed: u64) {}
+
+    fn decide(&mut self, situation: &Situation<'_>) -> Command {
+        assert_eq!((situation.dt_s, situation.decision_s), (5.0, 20.0));
+        assert_eq!(situation.time_s, 20.0 * self.own.len() as f64);
+        assert_eq!(situation.targets.len(), 4);
+        assert!(situation.targets[1..].iter().all(|target| target.forecast.is_none()));
+        let target = situation.targets[0];
+        assert_eq!(target.history.last(), Some(&target.position));
+        assert_eq!(situation.own.history.last(), Some(&situation.own.position));
+        self.own.push(situation.own.history.to_vec());
+        self.target.push(target.history.to_vec());
+        self.forecast.push(target.forecast.map(<[Position]>::to_vec));
+        Command { turn_rad: situation.own.max_turn_rad, speed_mps: None }
+    }
+}
+
+/// Sails an episode under a policy.
+fn sail(env: &mut Coastal, seed: u64, policy: &mut dyn Policy) {
+    let mut observation = vec![0.0; env.observation_len()];
+    env.reset(seed, &mut observation);
+    while let Ok(step) = env.step(&[env.ask(policy).unwrap()], &mut observation) {
+        if step.ends_episode() {
+            return;
+        }
+    }
+}
+
+#[test]
+fn policies_see_the_vessels_as_sensed_and_are_obeyed() {
+    let mut env = env(CoastalConfig { noise_m: 5.0, ..CoastalConfig::default() }, true);
+    let mut recorder = Recorder::default();
+    sail(&mut env, 4, &mut recorder);
+    let turned = env.states()[0].heading.turn_from(env.opening().unwrap().own_heading);
+    assert!((turned.to_degrees() - 36.0).abs() < 1e-4, "{turned}");
+    let moments = env.forecast_moments(4);
+    for (decision, (own, target)) in recorder.own.iter().zip(&recorder.target).enumerate() {
+        assert_eq!((own.len(), target.len()), (75, 75));
+        if decision % 2 == 0 {
+            assert_eq!(*target, moments[decision / 2].1);
+        } else {
+            assert_eq!(target[..71], recorder.target[decision - 1][4..], "the past stays as it was sensed");
+        }
+        // Forecast every second decision; in between what is left of it.
+        let ahead = recorder.forecast[decision].as_ref().unwrap();
+        assert_eq!(ahead.len(), if decision % 2 == 0 { 200 } else { 196 });
+        let step = ahead[1] - ahead[0];
+        assert!((step.length_m() - 50.0).abs() < 10.0, "{step:?}");
+    }
+    // Own ship is sensed with noise too, and came straight on at 8 m/s.
+    let gone_m = recorder.own[0][74].distance_m(recorder.own[0][0]);
+    assert!((gone_m - 8.0 * 5.0 * 74.0).abs() < 30.0 && gone_m.fract() != 0.0, "{gone_m}");
+}
+
+#[test]
+fn what_policies_see_of_others_does_not_depend_on_what_they_do() {
+    let mut env = env(CoastalConfig { noise_m: 20.0, ..CoastalConfig::default() }, false);
+    let mut recorder = Recorder::default();
+    sail(&mut env, 9, &mut recorder);
+    let mut observation = vec![0.0; env.observation_len()];
+    env.reset(9, &mut observation);
+    let mut held = Recorder::default();
+    for _ in 0..15 {
+        env.ask(&mut held).unwrap();
+        env.step(&[0.0], &mut observation).unwrap();
+    }
+    assert_eq!(held.target, recorder.target);
+    assert_ne!(held.own, recorder.own);
+    assert!(held.forecast.iter().all(Option::is_none), "the baseline environment forecasts nothing");
+}
+
+#[test]
+fn a_record_holds_every_time_step_and_agrees_with_the_outcome() {
+    let mut env = env(CoastalConfig { noise_m: 5.0, ..CoastalConfig::default() }, true);
+    env.keep_steps();
+    for seed in 0..4 {
+        episode(&mut env, seed, 0.5);
+        let record = env.record("someone").unwrap();
+        let outcome = env.outcome().unwrap();
+        assert_eq!((record.steps.len(), record.vessels.len(), record.seed), (61, 5, seed));
+        assert_eq!(record.has_contact(), outcome.contact);
+        let closest_m =
+            record.summaries().iter().map(|target| target.closest_centre_m).fold(f64::INFINITY, f64::min);
+        assert_eq!(closest_m, outcome.closest_m);
+        let last = record.steps.last().unwrap();
+        assert_eq!(last.vessels[3].position, env.states()[3].position);
+        assert!(last.vessels.iter().all(|vessel| vessel.observed != Some(vessel.position)));
+        // Forecast at every second decision; what is left of it in between.
+        let left = |step: usize| record.steps[step].vessels[1].ahead.len();
+        assert_eq!([left(0), left(1), left(7), left(8)], [200, 199, 193, 200]);
+        assert!(record.steps[5].vessels[2].ahead.is_empty());
+    }
 }
 
 #[test]

@@ -24,6 +24,8 @@ pub struct Opening {
     pub own_position: Position,
     /// Own ship's actual heading.
     pub own_heading: Nautical,
+    /// How own ship came there: straight on.
+    pub own_before: Linear,
     /// The vessels that move in straight lines.
     pub linear: Vec<Linear>,
 }
@@ -61,7 +63,8 @@ impl Opening {
                 Linear::new(position, velocity, dt_s)
             })
             .collect();
-        Some(Self { kind, start, path, own_position, own_heading, linear })
+        let own_before = Linear::new(own_position, own_velocity, dt_s);
+        Some(Self { kind, start, path, own_position, own_heading, own_before, linear })
     }
 }
 
