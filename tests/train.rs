@@ -103,3 +103,41 @@ fn what_is_no_run_is_told_with_a_remedy() {
     let trained = output(folder.path(), &TRAIN);
     assert!(text(&trained).1.contains("run.toml:1"), "{:?}", text(&trained));
 }
+
+/// An agent learns from the recorded tracks of an area and is measured on its held-out time.
+#[test]
+fn an_agent_trains_in_coastal_waters() {
+    let folder = folder();
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = format!(
+        "env = \"coastal\"\nestimates = false\nsteps = 90\n\n[tracks]\narea = {:?}\nfiles = [{:?}]\n\n[trainer]\n\
+         random_steps = 50\nevaluation_episodes = 2\n\n[trainer.agent]\nhidden = 16\n",
+        project.join("ais/ny-lower-bay.toml"),
+        project.join("ais/ny-harbor-2020-12.csv.gz"),
+    );
+    fs::write(folder.path().join("coastal.toml"), config).unwrap();
+    let trained = output(folder.path(), &["train", "--config", "coastal.toml", "--out", "coastal"]);
+    assert!(trained.status.success(), "{:?}", text(&trained));
+    let resolved = fs::read_to_string(folder.path().join("coastal/config.toml")).unwrap();
+    // What the file leaves out is the paper's value for this environment.
+    assert!(resolved.contains("steps = 90") && resolved.contains("evaluate_every = 5000"), "{resolved}");
+    assert!(folder.path().join("coastal/checkpoint.safetensors").exists());
+}
+
+#[test]
+fn a_forecaster_of_another_area_is_refused() {
+    let folder = folder();
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = format!(
+        "env = \"coastal\"\nforecaster = {:?}\n\n[tracks]\narea = {:?}\nfiles = [{:?}]\n",
+        project.join("models/coastal-ny-lower-bay.safetensors"),
+        project.join("ais/hampton-roads.toml"),
+        project.join("ais/hampton-roads-2020-06.csv.gz"),
+    );
+    fs::write(folder.path().join("coastal.toml"), config).unwrap();
+    let refused = output(folder.path(), &["train", "--config", "coastal.toml", "--out", "coastal"]);
+    assert!(!refused.status.success());
+    let error = text(&refused).1;
+    assert!(error.contains("was trained in a plane about 40.5"), "{error}");
+    assert!(!folder.path().join("coastal").exists());
+}

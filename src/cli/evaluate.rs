@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use super::agent_run::{POLICY, RunConfig, load_policy};
+use super::agent_run::{EnvMaker, POLICY, RunConfig, TracksPart, load_policy};
 use super::progress;
 use super::table::table;
 use crate::env::SeedDomain;
@@ -25,7 +25,8 @@ Examples:
   searoom evaluate runs/periodic --episodes 500 --json
 
 Actions are deterministic and the weights are those with the best evaluation during training. The seeds are
-those of benchmarks: neither training nor its evaluations ever use them.")]
+those of benchmarks: neither training nor its evaluations ever use them. Coastal encounters are those of the held-out
+time.")]
 pub struct Args {
     /// Folder of the run.
     run: PathBuf,
@@ -52,7 +53,7 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
         bail!("--episodes is {}: a spread needs two or more", args.episodes);
     }
     let config = RunConfig::of_run(&args.run)?;
-    let mut env = config.make_env()?;
+    let mut env = EnvMaker::new(&config, TracksPart::HeldOut)?.make()?;
     let rng = &mut ChaCha8Rng::seed_from_u64(0);
     let mut agent = Agent::new(config.trainer.agent.clone(), env.observation_len(), env.action_len(), rng);
     load_policy(&args.run.join(POLICY), &mut agent)?;

@@ -15,6 +15,7 @@ pub mod cpa;
 pub mod evaluate;
 pub mod forecast;
 pub mod progress;
+mod recorded;
 mod run_log;
 pub mod scenario;
 pub mod table;

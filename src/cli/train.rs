@@ -12,11 +12,10 @@ use anyhow::{Context, bail};
 use clap::Args as ClapArgs;
 use indicatif::ProgressBar;
 
-use super::agent_run::{CONFIG, EnvName, POLICY, RunConfig};
+use super::agent_run::{CONFIG, EnvMaker, EnvName, POLICY, RunConfig, TracksPart};
 use super::progress;
 use super::run_log::{CsvLog, open_events, unix_s};
 use crate::atomic_file;
-use crate::config;
 use crate::env::Env;
 use crate::env::open_water::MotionKind;
 use crate::nn::Compute;
@@ -31,6 +30,7 @@ use crate::rl::trainer::{Evaluation, FinishedEpisode, Trainer};
 Examples:
   searoom train --env open-water --motion periodic --algorithm lstm-sac --seed 1 --steps 200000 --out runs/periodic
   searoom train --env open-water --algorithm lstm-td3 --no-estimates --out runs/baseline
+  searoom train --env coastal --algorithm lstm-sac --seed 1 --steps 200000 --out runs/coastal
   searoom train --config my-run.toml --out runs/mine
   searoom train --resume runs/periodic
 
@@ -96,7 +96,8 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     }
     let (folder, config) = resolve(&args)?;
     let compute = Compute::new(args.threads.max(1));
-    let mut trainer = Trainer::new(config.trainer.clone(), config.make_env()?, compute);
+    let envs = EnvMaker::new(&config, TracksPart::Training)?;
+    let mut trainer = Trainer::new(config.trainer.clone(), envs.make()?, compute);
     let checkpoints = if args.resume.is_some() {
         checkpoint::load(&folder, &mut trainer)?
     } else {
@@ -106,7 +107,7 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     atomic_file::write(&folder.join(CONFIG), |file| file.write_all(resolved.as_bytes()))?;
 
     let (before, started) = (trainer.step(), Instant::now());
-    let mut run = Run::open(&args, folder, config, checkpoints, trainer.step())?;
+    let mut run = Run::open(&args, folder, config, checkpoints, envs.make()?, trainer.step())?;
     let finished = run.train(&mut trainer)?;
     let (made, took_s) = (trainer.step() - before, started.elapsed().as_secs_f64());
     writeln!(
@@ -137,8 +138,10 @@ fn resolve(args: &Args) -> anyhow::Result<(PathBuf, RunConfig)> {
             folder.display()
         );
     }
-    let mut config: RunConfig = args.config.as_deref().map(config::load).transpose()?.unwrap_or_default();
-    config.env = args.env.unwrap_or(config.env);
+    let mut config = match &args.config {
+        Some(file) => RunConfig::load(file, args.env)?,
+        None => RunConfig::of(args.env.unwrap_or_default()),
+    };
     config.steps = args.steps.unwrap_or(config.steps);
     config.estimates &= !args.no_estimates;
     config.open_water.motion = args.motion.unwrap_or(config.open_water.motion);
@@ -184,6 +187,7 @@ impl Run {
         folder: PathBuf,
         config: RunConfig,
         checkpoints: CheckpointWriter,
+        evaluation_env: Box<dyn Env>,
         step: u64,
     ) -> anyhow::Result<Self> {
         let header = |tags: &[&str]| format!("step,{}", tags.join(","));
@@ -194,7 +198,7 @@ impl Run {
             evaluations: log,
             best: best_so_far(&evaluations)?,
             events: open_events(&folder, step)?,
-            evaluation_env: config.make_env()?,
+            evaluation_env,
             checkpoint_every: args.checkpoint_every,
             log_every: args.log_every,
             episodes: VecDeque::new(),

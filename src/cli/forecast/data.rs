@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::ais::{self, Area, ImportConfig};
+use crate::cli::recorded;
 use crate::forecast::dataset::{RecordedConfig, RecordedSegments, SegmentSource, SyntheticSegments};
 use crate::forecast::{DataConfig, ModelConfig, Segment, split_by_time};
 use crate::geo::{Geodetic, Position};
-use crate::track::Track;
 
 /// Segments to learn from.
 pub(super) struct Training {
@@ -52,7 +51,7 @@ pub(super) fn training_source(config: &ModelConfig) -> anyhow::Result<Training> 
             origin: None,
         }),
         DataConfig::Recorded { area, files, split, segments, .. } => {
-            let recorded = recorded(Path::new(area), files.iter().map(Path::new))?;
+            let recorded = recorded::import(Path::new(area), files.iter().map(Path::new))?;
             let split = split_by_time(&recorded.tracks, split)?;
             let source = RecordedSegments::new(split.train, history_len, horizon, *segments)?;
             Ok(Training { source: Box::new(source), origin: Some(recorded.origin) })
@@ -70,7 +69,7 @@ pub(super) fn held_out(
 ) -> anyhow::Result<HeldOut> {
     let history_len = config.kind.history_len();
     if let Some(area) = &other.area {
-        let recorded = recorded(area, other.ais.iter().map(PathBuf::as_path))?;
+        let recorded = recorded::import(area, other.ais.iter().map(PathBuf::as_path))?;
         let all = RecordedSegments::new(recorded.tracks, history_len, horizon, RecordedConfig::default())?;
         return Ok(HeldOut { segments: all.spread(count), seen: BTreeSet::new() });
     }
@@ -81,7 +80,7 @@ pub(super) fn held_out(
             Ok(HeldOut { segments, seen: BTreeSet::new() })
         }
         DataConfig::Recorded { area, files, split, segments, .. } => {
-            let recorded = recorded(Path::new(area), files.iter().map(Path::new))?;
+            let recorded = recorded::import(Path::new(area), files.iter().map(Path::new))?;
             let split = split_by_time(&recorded.tracks, split)?;
             let seen = split.trained_vessels();
             let held_out = RecordedSegments::new(split.test, history_len, horizon, *segments)?;
@@ -109,18 +108,4 @@ fn held_out_stream(seed: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(HELD_OUT_STREAM);
     rng
-}
-
-struct Recorded {
-    tracks: Vec<Track>,
-    origin: Geodetic,
-}
-
-/// Imports tracks with the default thresholds.
-fn recorded<'a>(area: &Path, files: impl Iterator<Item = &'a Path>) -> anyhow::Result<Recorded> {
-    let remedy = "recorded tracks (paths are relative to the folder you are in; those of shipped models to the project's root)";
-    let area = Area::load(area).context(remedy)?;
-    let files: Vec<PathBuf> = files.map(Path::to_owned).collect();
-    let import = ais::import(&files, &area, &ImportConfig::default(), None, &|_| ()).context(remedy)?;
-    Ok(Recorded { tracks: import.tracks, origin: import.plane.origin })
 }
