@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::layout::PANEL;
-use super::simd::{Isa, Kernel, Simd};
+use super::simd::{Isa, Kernel, Simd, prefetch};
 use super::{Activation, Real};
 
 /// How a batch of vectors lies in memory: element `(row, column)` at
@@ -97,6 +97,10 @@ pub(crate) struct Product<T> {
     pub activation: Activation,
 }
 
+/// Inner indices that a turn of the innermost loop takes: the addresses of the rows of `A`, worked out on the
+/// ports that the multiply-adds need, serve them all.
+const AT_ONCE: usize = 4;
+
 impl<T: Real> Product<T> {
     /// Computes the product.
     ///
@@ -109,27 +113,28 @@ impl<T: Real> Product<T> {
     }
 
     #[inline(always)]
-    fn columns<S: Simd<Scalar = T>, const VECTORS: usize>(&self, simd: S, column: usize) {
+    fn columns<S: Simd<Scalar = T>, const VECTORS: usize, const FULL: bool>(&self, simd: S, column: usize) {
         for step in 0..self.steps {
             let mut row = 0;
             while row < self.rows {
                 let left = self.rows - row;
                 row += if S::TILE_ROWS >= 8 && left >= 8 {
-                    self.tile::<S, 8, VECTORS>(simd, step, row, column)
+                    self.tile::<S, 8, VECTORS, FULL>(simd, step, row, column)
                 } else if left >= 4 {
-                    self.tile::<S, 4, VECTORS>(simd, step, row, column)
+                    self.tile::<S, 4, VECTORS, FULL>(simd, step, row, column)
                 } else if left >= 2 {
-                    self.tile::<S, 2, VECTORS>(simd, step, row, column)
+                    self.tile::<S, 2, VECTORS, FULL>(simd, step, row, column)
                 } else {
-                    self.tile::<S, 1, VECTORS>(simd, step, row, column)
+                    self.tile::<S, 1, VECTORS, FULL>(simd, step, row, column)
                 };
             }
         }
     }
 
-    /// One register tile, `ROWS` by `VECTORS * LANES`; returns `ROWS`.
+    /// One register tile, `ROWS` by `VECTORS * LANES`; returns `ROWS`. Only where it is not `FULL` may columns
+    /// be missing from its vectors.
     #[inline(always)]
-    fn tile<S: Simd<Scalar = T>, const ROWS: usize, const VECTORS: usize>(
+    fn tile<S: Simd<Scalar = T>, const ROWS: usize, const VECTORS: usize, const FULL: bool>(
         &self,
         simd: S,
         step: usize,
@@ -157,10 +162,7 @@ impl<T: Real> Product<T> {
                 Start::Result => {
                     for (r, row) in sum.iter_mut().enumerate() {
                         for (v, sum) in row.iter_mut().enumerate() {
-                            *sum = match valid(v) {
-                                n if n == S::LANES => simd.load(c(r, v)),
-                                n => simd.load_first(c(r, v), n),
-                            };
+                            *sum = if FULL { simd.load(c(r, v)) } else { simd.load_first(c(r, v), valid(v)) };
                         }
                     }
                 }
@@ -168,20 +170,25 @@ impl<T: Real> Product<T> {
 
             let mut a = self.a.add(step * self.a_strides.step + row * self.a_strides.row);
             let mut b = self.b.add(panel * self.panel_rows * PANEL + lane);
+            // Together the tiles of this panel ask for the next one.
+            let mut ahead = b.wrapping_add((self.panel_rows + row * self.inner / self.rows) * PANEL);
+            let ahead_step = AT_ONCE * PANEL * ROWS / self.rows;
             let mut left = self.inner;
             while left > 0 {
                 let depth = left.min(PANEL);
-                for k in 0..depth {
-                    let mut weights = [simd.splat(T::ZERO); VECTORS];
-                    for (v, weights) in weights.iter_mut().enumerate() {
-                        *weights = simd.load(b.add(k * PANEL + v * S::LANES));
+                let mut k = 0;
+                while k + AT_ONCE <= depth {
+                    prefetch(ahead);
+                    prefetch(ahead.wrapping_add(PANEL / 2));
+                    ahead = ahead.wrapping_add(ahead_step);
+                    for next in k..k + AT_ONCE {
+                        multiply(simd, a.add(next), self.a_strides.row, b.add(next * PANEL), &mut sum);
                     }
-                    for (r, row) in sum.iter_mut().enumerate() {
-                        let x = simd.splat(*a.add(r * self.a_strides.row + k));
-                        for v in 0..VECTORS {
-                            row[v] = simd.mul_add(x, weights[v], row[v]);
-                        }
-                    }
+                    k += AT_ONCE;
+                }
+                while k < depth {
+                    multiply(simd, a.add(k), self.a_strides.row, b.add(k * PANEL), &mut sum);
+                    k += 1;
                 }
                 a = a.wrapping_add(self.a_strides.panel);
                 b = b.wrapping_add(PANEL * PANEL);
@@ -190,15 +197,51 @@ impl<T: Real> Product<T> {
 
             for (r, row) in sum.iter().enumerate() {
                 for (v, &sum) in row.iter().enumerate() {
-                    let y = self.activation.apply(simd, sum);
-                    match valid(v) {
-                        n if n == S::LANES => simd.store(c(r, v), y),
-                        n => simd.store_first(c(r, v), y, n),
+                    if FULL {
+                        simd.store(c(r, v), sum);
+                    } else {
+                        simd.store_first(c(r, v), sum, valid(v));
+                    }
+                }
+            }
+            // From memory, in loops: with a long function of the registers the compiler would keep none of them.
+            if self.activation != Activation::Identity {
+                for r in 0..ROWS {
+                    for v in 0..VECTORS {
+                        let y = simd.load_first(c(r, v), valid(v));
+                        simd.store_first(c(r, v), self.activation.apply(simd, y), valid(v));
                     }
                 }
             }
         }
         ROWS
+    }
+}
+
+/// Adds `a b` to a tile, for one inner index: `a` is a column of `ROWS`, `stride` apart, `b` a row.
+///
+/// # Safety
+/// `a` and `b` must be valid for reads of the tile's height and width.
+#[inline(always)]
+unsafe fn multiply<S: Simd, const ROWS: usize, const VECTORS: usize>(
+    simd: S,
+    a: *const S::Scalar,
+    stride: usize,
+    b: *const S::Scalar,
+    tile: &mut [[S::Vector; VECTORS]; ROWS],
+) {
+    // SAFETY: by the caller's contract.
+    unsafe {
+        let mut weights = [simd.splat(S::Scalar::ZERO); VECTORS];
+        for (v, weights) in weights.iter_mut().enumerate() {
+            *weights = simd.load(b.add(v * S::LANES));
+        }
+        for (r, row) in tile.iter_mut().enumerate() {
+            let x = simd.splat(*a.add(r * stride));
+            for v in 0..VECTORS {
+                row[v] = simd.mul_add(x, weights[v], row[v]);
+            }
+        }
     }
 }
 
@@ -210,11 +253,17 @@ impl<T: Real> Kernel<T> for Product<T> {
         let mut column = 0;
         while column < self.columns {
             let left = (self.columns - column).min(PANEL - column % PANEL);
-            if left > S::LANES {
-                self.columns::<S, 2>(simd, column);
+            if left >= 2 * S::LANES {
+                self.columns::<S, 2, true>(simd, column);
                 column += 2 * S::LANES;
+            } else if left > S::LANES {
+                self.columns::<S, 2, false>(simd, column);
+                column += 2 * S::LANES;
+            } else if left == S::LANES {
+                self.columns::<S, 1, true>(simd, column);
+                column += S::LANES;
             } else {
-                self.columns::<S, 1>(simd, column);
+                self.columns::<S, 1, false>(simd, column);
                 column += S::LANES;
             }
         }

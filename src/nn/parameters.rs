@@ -95,9 +95,14 @@ impl<T: Real> Parameters<T> {
     /// `self += rate (other - self)`: a target network follows (`polyak = 1 - rate`).
     pub fn follow(&mut self, compute: &mut Compute, other: &Self, rate: f64) {
         assert_eq!(self.values.len(), other.values.len());
+        let rate = T::from_f64(rate);
         self.update_with(compute, |compute, values| {
-            let blend = Blend { target: values, source: &other.values, rate: T::from_f64(rate) };
-            T::dispatch(compute.isa(), blend);
+            let (isa, count, values) = (compute.isa(), values.len(), Shared::new(values));
+            compute.split(count, PANEL, count, &|part| {
+                // SAFETY: parts are disjoint.
+                let target = unsafe { values.range(part.clone()) };
+                T::dispatch(isa, Blend { target, source: &other.values[part], rate });
+            });
         });
     }
 

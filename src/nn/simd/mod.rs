@@ -46,6 +46,19 @@ impl Isa {
     }
 }
 
+/// Asks for the cache line at `address`, which will be read soon; any address will do.
+#[inline(always)]
+pub fn prefetch<T>(address: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: part of the baseline; a prefetch never faults.
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(address.cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = address;
+}
+
 /// Vectors of [`Simd::LANES`] numbers and what can be done with them.
 pub trait Simd: Copy {
     /// The number in a lane.
