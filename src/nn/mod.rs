@@ -28,7 +28,6 @@ mod elementwise;
 mod layout;
 mod loss;
 mod lstm;
-mod lstm_gates;
 mod matmul;
 mod parameters;
 mod real;

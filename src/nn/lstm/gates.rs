@@ -1,8 +1,8 @@
 //! The element-wise half of an LSTM step, for one block of [`PANEL`] hidden units.
 
-use super::Real;
-use super::layout::PANEL;
-use super::simd::{Isa, Kernel, Simd};
+use crate::nn::Real;
+use crate::nn::layout::PANEL;
+use crate::nn::simd::{Isa, Kernel, Simd};
 
 /// Gates in PyTorch's order.
 pub(crate) const GATES: usize = 4;
