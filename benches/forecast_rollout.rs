@@ -18,7 +18,7 @@ const HISTORY: usize = 10;
 const STEPS: usize = 100;
 
 fn main() {
-    let (threads, _) = support::arguments();
+    let threads = support::Arguments::parse().threads();
     let file =
         WeightsFile::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join(MODEL)).expect("the shipped model");
     let mut forecaster = LstmForecaster::new(Model::from_file(file).expect("a forecaster"), threads);

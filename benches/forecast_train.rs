@@ -14,10 +14,10 @@ const ROWS: usize = 32;
 const LEARNING_RATE: f64 = 1e-4;
 
 fn main() {
-    let (threads, subjects) = support::arguments();
+    let arguments = support::Arguments::parse();
     for (name, config) in [("open", NetworkConfig::open_water()), ("coastal", NetworkConfig::coastal())] {
-        if subjects.is_empty() || subjects.iter().any(|subject| subject == name) {
-            measure(name, config, threads);
+        if arguments.wants(name) {
+            measure(name, config, arguments.threads());
         }
     }
 }

@@ -128,6 +128,21 @@ impl RecurrentNet {
             + self.lstm.operations(steps, rows)
     }
 
+    /// Multiply-adds of [`Self::backward`]: each product of the forward pass twice, except that no gradient
+    /// with respect to observations is wanted.
+    #[must_use]
+    pub fn backward_operations(&self, steps: usize, rows: usize) -> usize {
+        let unwanted = self.current[0].operations(rows) + self.memory_in.operations(steps * rows);
+        2 * self.operations(steps, rows) - unwanted
+    }
+
+    /// Multiply-adds of [`Self::backward_to_action`].
+    #[must_use]
+    pub fn backward_to_action_operations(&self, rows: usize) -> usize {
+        let layers = [&self.current[0], &self.current[1], &self.integrate[0], &self.integrate[1]];
+        layers.iter().map(|layer| layer.operations(rows)).sum()
+    }
+
     /// Buffers for batches of `rows` rows with histories of up to `steps` observations.
     #[must_use]
     pub fn buffers<T: Real>(&self, steps: usize, rows: usize) -> RecurrentBuffers<T> {
