@@ -521,6 +521,7 @@ impl Env for Coastal {
         self.terms[1].value = -(too_close as f64);
 
         self.estimate(&episode);
+        self.keep_path_ahead(episode.step(self.steps_per_decision()));
         self.observe(&episode, observation);
         let truncated = episode.decision == self.config.decisions;
         self.episode = Some(episode);

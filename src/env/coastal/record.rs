@@ -19,10 +19,20 @@ impl Coastal {
             velocity: state.velocity,
             heading: state.heading,
             observed: (self.config.noise_m > 0.0).then(|| self.sensed(episode, vessel, step, state.position)),
-            ahead: if vessel == 1 { self.path_ahead(step).unwrap_or_default().to_vec() } else { Vec::new() },
+            ahead: Vec::new(),
         });
         let pairs = self.world.reports().iter().map(PairStep::from).collect();
         steps.push(Step { vessels: vessels.collect(), pairs });
+        self.kept_steps = Some(steps);
+        self.keep_path_ahead(step);
+    }
+
+    /// Writes the forecast in force into the step kept last: a decision makes a new one.
+    pub(super) fn keep_path_ahead(&mut self, step: i64) {
+        let Some(mut steps) = self.kept_steps.take() else { return };
+        if let Some(last) = steps.last_mut() {
+            last.vessels[1].ahead = self.path_ahead(step).unwrap_or_default().to_vec();
+        }
         self.kept_steps = Some(steps);
     }
 
