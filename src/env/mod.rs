@@ -87,6 +87,32 @@ pub trait Env: Send {
     fn reward_terms(&self) -> &[RewardTerm];
 }
 
+impl<E: Env + ?Sized> Env for Box<E> {
+    fn observation_len(&self) -> usize {
+        (**self).observation_len()
+    }
+
+    fn action_len(&self) -> usize {
+        (**self).action_len()
+    }
+
+    fn max_decisions(&self) -> usize {
+        (**self).max_decisions()
+    }
+
+    fn reset(&mut self, seed: u64, observation: &mut [f32]) {
+        (**self).reset(seed, observation);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Result<Step, ActionError> {
+        (**self).step(action, observation)
+    }
+
+    fn reward_terms(&self) -> &[RewardTerm] {
+        (**self).reward_terms()
+    }
+}
+
 /// What an episode's seed is for. Seeds of different domains never coincide, so that an agent is
 /// never tested on an episode it was trained on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

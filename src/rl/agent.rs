@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use super::networks::History;
+use super::networks::{History, RecurrentNet};
 use super::replay::Batch;
 use super::sac::{Sac, SacConfig};
 use super::td3::{Td3, Td3Config};
@@ -195,6 +195,15 @@ impl Agent {
         match &mut self.learner {
             Learner::Td3(td3) => td3.explore(compute, observation, memory.history(), rng, action),
             Learner::Sac(sac) => sac.explore(compute, observation, memory.history(), rng, action),
+        }
+    }
+
+    /// Layers and weights of the policy, and whether its outputs are the means of a Gaussian, to be squashed,
+    /// and what follows them.
+    pub(super) fn policy(&self) -> (&RecurrentNet, &Parameters<f32>, bool) {
+        match &self.learner {
+            Learner::Td3(td3) => (td3.actor.net(), &td3.actor.online, false),
+            Learner::Sac(sac) => (sac.actor.net(), &sac.actor.online, true),
         }
     }
 

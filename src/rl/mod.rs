@@ -9,6 +9,7 @@ pub mod checkpoint;
 pub mod critics;
 pub mod networks;
 pub mod replay;
+pub mod rollout;
 pub mod sac;
 pub mod td3;
 pub mod trainer;

@@ -3,4 +3,5 @@
 mod checkpoint;
 mod golden;
 mod learning;
+mod rollout;
 mod tasks;
