@@ -211,27 +211,7 @@ impl RecurrentNet {
         let rows = buffers.rows;
         let hidden = self.shape.hidden;
         self.integration_backward(compute, parameters, buffers, Some(gradients));
-        let [d_first, d_second] = &mut buffers.d_current;
-        self.current[1].backward(
-            compute,
-            parameters,
-            &buffers.current[0],
-            &buffers.current[1],
-            rows,
-            d_second,
-            Some(d_first),
-            Some(gradients),
-        );
-        self.current[0].backward(
-            compute,
-            parameters,
-            &buffers.input,
-            &buffers.current[0],
-            rows,
-            &mut buffers.d_current[0],
-            None,
-            Some(gradients),
-        );
+        self.current_backward(compute, parameters, buffers, Some(gradients), false);
         let steps = longest(&history, rows);
         if steps == 0 {
             return;
@@ -267,29 +247,8 @@ impl RecurrentNet {
         buffers: &mut RecurrentBuffers<T>,
         d_action: &mut [T],
     ) {
-        let rows = buffers.rows;
         self.integration_backward(compute, parameters, buffers, None);
-        let [d_first, d_second] = &mut buffers.d_current;
-        self.current[1].backward(
-            compute,
-            parameters,
-            &buffers.current[0],
-            &buffers.current[1],
-            rows,
-            d_second,
-            Some(d_first),
-            None,
-        );
-        self.current[0].backward(
-            compute,
-            parameters,
-            &buffers.input,
-            &buffers.current[0],
-            rows,
-            &mut buffers.d_current[0],
-            Some(&mut buffers.d_input),
-            None,
-        );
+        self.current_backward(compute, parameters, buffers, None, true);
         let (n, m) = (self.shape.observation_len, self.shape.action_len);
         for (d_action, d_input) in d_action.chunks_mut(m).zip(buffers.d_input.chunks(n + m)) {
             d_action.copy_from_slice(&d_input[n..]);
@@ -330,6 +289,32 @@ impl RecurrentNet {
         for (current, joined) in buffers.d_current[1].chunks_mut(hidden).zip(joined) {
             current.copy_from_slice(&joined[hidden..]);
         }
+    }
+
+    /// From the current branch's output back to its input: gradients of the weights, and of the input, each
+    /// where it is wanted.
+    fn current_backward<T: Real>(
+        &self,
+        compute: &mut Compute,
+        parameters: &Parameters<T>,
+        buffers: &mut RecurrentBuffers<T>,
+        mut gradients: Option<&mut Gradients<T>>,
+        wants_input: bool,
+    ) {
+        let RecurrentBuffers { rows, input, current, d_input, d_current, .. } = buffers;
+        let [d_first, d_second] = d_current;
+        self.current[1].backward(
+            compute,
+            parameters,
+            &current[0],
+            &current[1],
+            *rows,
+            d_second,
+            Some(d_first),
+            gradients.as_deref_mut(),
+        );
+        let d_input = wants_input.then_some(&mut **d_input);
+        self.current[0].backward(compute, parameters, input, &current[0], *rows, d_first, d_input, gradients);
     }
 
     fn join_input<T: Real>(&self, observation: &[T], action: &[T], buffers: &mut RecurrentBuffers<T>) {
