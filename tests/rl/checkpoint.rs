@@ -65,6 +65,23 @@ fn a_run_resumed_from_disk_goes_on_with_the_same_bits() {
     }
 }
 
+/// Before the first update, at the end of an episode and beside it, and later on.
+#[test]
+fn a_run_can_be_stopped_at_any_step() {
+    for stop in [1, 29, 30, 31, 90, 333] {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let mut straight = trainer(config(Algorithm::LstmTd3));
+        run_to(&mut straight, stop);
+        CheckpointWriter::new(folder.path()).save(&mut straight).expect("saved");
+        let mut resumed = trainer(config(Algorithm::LstmTd3));
+        checkpoint::load(folder.path(), &mut resumed).expect("loaded");
+        run_to(&mut straight, stop + 45);
+        run_to(&mut resumed, stop + 45);
+        assert_eq!(weights(&mut straight), weights(&mut resumed), "stopped at {stop}");
+        assert_eq!(straight.state(), resumed.state(), "stopped at {stop}");
+    }
+}
+
 #[test]
 fn a_checkpoint_of_another_configuration_is_refused_by_key() {
     let (folder, ..) = saved(Algorithm::LstmSac);
@@ -109,4 +126,31 @@ fn what_a_killed_process_leaves_behind_does_no_harm() {
     writer.save(&mut resumed).expect("saved");
     assert_eq!(chunk_files(folder.path()).len(), 1);
     assert!(checkpoint::load(folder.path(), &mut trainer(config(Algorithm::LstmSac))).is_ok());
+}
+
+/// Of a replay of three chunks, a checkpoint writes those that have changed since the last one.
+#[test]
+fn a_checkpoint_does_not_rewrite_the_whole_replay() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    // Random decisions all along: this is about files.
+    let config = TrainerConfig { random_steps: u64::MAX, ..config(Algorithm::LstmSac) };
+    let mut trainer = trainer(TrainerConfig { replay_capacity: 100_000, ..config });
+    let mut writer = CheckpointWriter::new(folder.path());
+    run_to(&mut trainer, 40_000);
+    writer.save(&mut trainer).expect("saved");
+    let written = |folder: &Path| -> Vec<(PathBuf, std::time::SystemTime)> {
+        let mut files: Vec<_> = chunk_files(folder)
+            .into_iter()
+            .map(|file| (file.clone(), fs::metadata(file).and_then(|data| data.modified()).expect("time")))
+            .collect();
+        files.sort();
+        files
+    };
+    let first = written(folder.path());
+    assert_eq!(first.len(), 3);
+    run_to(&mut trainer, 40_100);
+    writer.save(&mut trainer).expect("saved");
+    let second = written(folder.path());
+    assert_eq!(first[..2], second[..2], "whole chunks stay as they are");
+    assert_ne!(first[2], second[2], "the last one has grown");
 }

@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use super::*;
 use crate::angle::Nautical;
 use crate::forecast::LinearForecaster;
@@ -36,15 +38,24 @@ fn only(scenario: ScenarioChoice) -> CoastalConfig {
 
 /// Runs an episode with one action all along; the observations of all decisions.
 fn episode(env: &mut Coastal, seed: u64, action: f32) -> Vec<Vec<f32>> {
+    episode_with_rewards(env, seed, action).0
+}
+
+/// The same, and the reward terms of every decision.
+fn episode_with_rewards(env: &mut Coastal, seed: u64, action: f32) -> (Vec<Vec<f32>>, Vec<[f64; 2]>) {
     let mut observation = vec![0.0; env.observation_len()];
     env.reset(seed, &mut observation);
     let mut seen = vec![observation.clone()];
+    let mut rewards = Vec::new();
     loop {
         let step = env.step(&[action], &mut observation).unwrap();
         seen.push(observation.clone());
+        let terms = [0, 1].map(|term| env.reward_terms()[term].value);
+        assert_eq!(step.reward, terms[0] + terms[1]);
+        rewards.push(terms);
         if step.ends_episode() {
             assert!(step.truncated && !step.terminated);
-            return seen;
+            return (seen, rewards);
         }
     }
 }
@@ -152,6 +163,13 @@ fn the_recorded_vessel_is_estimated_every_second_decision() {
 fn noise_touches_features_and_never_rewards_or_the_episode() {
     let noisy = CoastalConfig { noise_m: 20.0, ..CoastalConfig::default() };
     let (mut calm_env, mut noisy_env) = (env(CoastalConfig::default(), true), env(noisy, true));
+    // Full port: the wrong side all along, and contact in one scenario or another.
+    for seed in 0..20 {
+        let [calm, noisy] =
+            [&mut calm_env, &mut noisy_env].map(|env| episode_with_rewards(env, seed, -1.0).1);
+        assert_eq!(calm, noisy);
+        assert!(calm.iter().flatten().any(|&term| term < 0.0));
+    }
     let (calm, noisy) = (episode(&mut calm_env, 11, 0.2), episode(&mut noisy_env, 11, 0.2));
     assert_eq!(calm_env.states(), noisy_env.states());
     assert_eq!(calm_env.outcome(), noisy_env.outcome());
@@ -366,4 +384,41 @@ fn traffic_is_placed_by_its_distributions() {
 fn tracks_without_a_start_are_refused_with_a_remedy() {
     let error = RecordedTraffic::new(vec![track(1, 9000.0, 3000.0)], &CoastalConfig::default()).unwrap_err();
     assert!(error.to_string().contains("BeforeCurve"), "{error}");
+}
+
+#[test]
+fn actions_that_cannot_be_taken_are_refused_and_change_nothing() {
+    let mut env = env(CoastalConfig::default(), false);
+    let mut observation = vec![0.0; 18];
+    assert_eq!(env.step(&[0.0], &mut observation), Err(ActionError::EpisodeOver), "no episode has begun");
+    env.reset(1, &mut observation);
+    let states = env.states().to_vec();
+    let refused = env.step(&[f32::NAN], &mut observation);
+    assert!(matches!(refused, Err(ActionError::NotFinite { index: 0, .. })), "{refused:?}");
+    assert_eq!(env.step(&[], &mut observation), Err(ActionError::Length { given: 0, expected: 1 }));
+    assert_eq!(env.states(), states);
+    assert!(env.step(&[0.0], &mut observation).is_ok());
+}
+
+/// `too_close` counts true distances at the decision, one per obstacle within 300 m.
+#[test]
+fn rewards_are_counted_by_hand() {
+    let mut env = env(CoastalConfig { noise_m: 20.0, ..CoastalConfig::default() }, false);
+    let mut observation = vec![0.0; 18];
+    let mut contacts = 0;
+    for seed in 0..30 {
+        env.reset(seed, &mut observation);
+        let path = env.opening().unwrap().path;
+        for _ in 0..15 {
+            env.step(&[0.1], &mut observation).unwrap();
+            let own = env.states()[0].position;
+            let within =
+                env.states()[1..].iter().filter(|state| own.distance_m(state.position) <= 300.0).count();
+            let to_port_m = -(own - path.position).starboard_of_m(path.course);
+            assert_eq!(env.reward_terms()[1].value, -(within as f64));
+            assert_eq!(env.reward_terms()[0].value, if to_port_m >= 200.0 { -1.0 } else { 0.0 });
+            contacts += within;
+        }
+    }
+    assert!(contacts > 0);
 }

@@ -139,3 +139,119 @@ impl SensorNoise {
         self.draws[row * self.vessels + vessel]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRAWS: u64 = 6000;
+
+    fn assert_near(value: f64, expected: f64, tolerance: f64, what: &str) {
+        assert!((value - expected).abs() < tolerance, "{what}: {value} is not {expected}");
+    }
+
+    /// Mean and variance of what is drawn.
+    fn moments(mut draw: impl FnMut(&mut ChaCha8Rng) -> f64) -> (f64, f64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let values: Vec<f64> = (0..DRAWS).map(|_| draw(&mut rng)).collect();
+        let mean = values.iter().sum::<f64>() / DRAWS as f64;
+        (mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / DRAWS as f64)
+    }
+
+    const OWN: Position = Position { north_m: 300.0, east_m: -200.0 };
+
+    fn heading() -> Nautical {
+        Nautical::from_degrees(350.0)
+    }
+
+    #[test]
+    fn following_traffic_is_placed_by_its_formulas() {
+        let config = CoastalConfig::default();
+        let following = |rng: &mut ChaCha8Rng| draw_following(&config, OWN, heading(), rng);
+        let (mean, variance) = moments(|rng| following(rng).1.speed_mps());
+        assert_near(mean, 8.0, 0.01, "mean speed");
+        assert_near(variance.sqrt(), 0.2, 0.006, "spread of the speed");
+        let (mean, variance) = moments(|rng| following(rng).1.course().turn_from(heading()).to_degrees());
+        assert_near(mean, 0.0, 0.8, "mean course, U(-30, 30) degrees");
+        assert_near(variance, 300.0, 10.0, "its variance, 60^2 / 12");
+        let (mean, variance) = moments(|rng| following(rng).0.distance_m(OWN));
+        assert_near(mean, 750.0, 7.0, "mean distance, U(500, 1000) m");
+        assert_near(variance, 500.0 * 500.0 / 12.0, 700.0, "its variance");
+        let (mean, variance) = moments(|rng| {
+            let (position, velocity) = following(rng);
+            (OWN - position).bearing().turn_from(velocity.course())
+        });
+        assert!(mean.abs() < 1e-9 && variance < 1e-18, "own ship lies right ahead on its course");
+    }
+
+    #[test]
+    fn other_traffic_is_placed_by_its_formulas() {
+        let config = CoastalConfig::default();
+        let own_velocity = Velocity::from_course(heading(), 8.0);
+        let other = |rng: &mut ChaCha8Rng| draw_other(&config, OWN, own_velocity, rng);
+        for axis in [|way: Displacement| way.north_m, |way: Displacement| way.east_m] {
+            let offset = |rng: &mut ChaCha8Rng| axis(other(rng).0 - OWN);
+            let (mean, variance) = moments(|rng| offset(rng).abs());
+            assert_near(mean, 2250.0, 22.0, "mean offset, U(1500, 3000) m");
+            assert_near(variance, 1500.0 * 1500.0 / 12.0, 6500.0, "its variance");
+            let (mean, _) = moments(|rng| offset(rng).signum());
+            assert_near(mean, 0.0, 0.05, "both signs alike");
+        }
+        let (mean, _) = moments(|rng| {
+            let (position, _) = other(rng);
+            ((position - OWN).north_m * (position - OWN).east_m).signum()
+        });
+        assert_near(mean, 0.0, 0.05, "signs are independent");
+        // Of all courses, those that keep clear, alike: the accepted share of a half circle is its share of them.
+        let clear = |position: Position, course_deg: f64| {
+            let velocity = Velocity::from_course(Nautical::from_degrees(course_deg), 8.0);
+            closest_approach(OWN.xy(), own_velocity.xy(), position.xy(), velocity.xy()).distance_m >= 800.0
+        };
+        let exact = CoastalConfig { linear_speed_sd_mps: 0.0, ..config };
+        let (mut eastward, mut expected) = (0.0, 0.0);
+        let mut rng = ChaCha8Rng::seed_from_u64(13);
+        for _ in 0..DRAWS {
+            let (position, velocity) = draw_other(&exact, OWN, own_velocity, &mut rng);
+            eastward += f64::from(u8::from(velocity.east_mps > 0.0)) / DRAWS as f64;
+            let allowed: Vec<f64> = (0..120)
+                .map(|k| 1.5 + 3.0 * f64::from(k))
+                .filter(|&course| clear(position, course))
+                .collect();
+            let east = allowed.iter().filter(|&&course| course < 180.0).count();
+            expected += east as f64 / allowed.len() as f64 / DRAWS as f64;
+        }
+        assert_near(eastward, expected, 0.02, "share of courses to the east");
+    }
+
+    #[test]
+    fn own_ship_is_disturbed_by_its_formulas() {
+        let config = CoastalConfig::default();
+        let start = HeadOnStart { track: 0, mmsi: 1, index: 75 };
+        let starts =
+            HeadOnStarts { before_curve: vec![start], straight_on: vec![start], ..HeadOnStarts::default() };
+        let target = Velocity::from_course(Nautical::from_degrees(30.0), 6.0);
+        let opening = |rng: &mut ChaCha8Rng| {
+            Opening::draw(&config, &starts, 5.0, |_| (Position::ORIGIN, target), rng).unwrap()
+        };
+        for axis in [|way: Displacement| way.north_m, |way: Displacement| way.east_m] {
+            let (mean, variance) = moments(|rng| {
+                let opening = opening(rng);
+                axis(opening.own_position - opening.path.position)
+            });
+            assert_near(mean, 0.0, 0.04, "mean disturbance");
+            assert_near(variance, 1.0, 0.06, "its variance");
+        }
+        let (mean, variance) = moments(|rng| {
+            let opening = opening(rng);
+            opening.own_heading.turn_from(opening.path.course).to_degrees()
+        });
+        assert_near(mean, -1.5, 0.04, "mean heading, U(-3, 0) degrees");
+        assert_near(variance, 0.75, 0.03, "its variance, 3^2 / 12");
+        let (mean, _) = moments(|rng| f64::from(u8::from(opening(rng).kind == HeadOnKind::BeforeCurve)));
+        assert_near(mean, 0.5, 0.03, "both scenarios alike");
+        // 240 s to collision at 8 and 6 m/s, on the reciprocal course.
+        let path = opening(&mut ChaCha8Rng::seed_from_u64(1)).path;
+        assert_near(path.position.distance_m(Position::ORIGIN), 240.0 * 14.0, 1e-6, "distance at the start");
+        assert_near(path.course.degrees(), 210.0, 1e-9, "course at the start");
+    }
+}

@@ -445,4 +445,68 @@ mod tests {
             }
         }
     }
+
+    /// Both velocity components are U(-5, 5) for either rule, the longitudinal speed of the agent U(1, 5), the
+    /// first time to collision at reset U(-300, 0) where nothing was replaced.
+    #[test]
+    fn velocities_are_drawn_by_their_distributions() {
+        let episodes = 1500;
+        let (mut agent_speed, mut moments, mut negative) = ([0.0; 2], [[0.0; 2]; 4], 0);
+        for seed in 0..episodes {
+            let field = Field::new(&calm(), seed);
+            let speed_mps = field.agent().velocity.x;
+            agent_speed[0] += speed_mps;
+            agent_speed[1] += (speed_mps - 3.0).powi(2);
+            for obstacle in field.obstacles() {
+                let first = if obstacle.rule == PassingRule::Right { 0 } else { 2 };
+                for (slot, value) in [obstacle.velocity.x, obstacle.velocity.y].into_iter().enumerate() {
+                    moments[first + slot][0] += value / 5.0;
+                    moments[first + slot][1] += value * value / 5.0;
+                    assert!(value.abs() <= 5.0);
+                }
+            }
+            negative += field.obstacles().iter().filter(|obstacle| obstacle.ttc_s < 0.0).count();
+        }
+        let episodes = episodes as f64;
+        assert!((agent_speed[0] / episodes - 3.0).abs() < 0.09, "U(1, 5) has mean 3");
+        assert!((agent_speed[1] / episodes - 4.0 / 3.0).abs() < 0.09, "and variance 4 / 3");
+        for [mean, square] in moments {
+            assert!((mean / episodes).abs() < 0.1, "U(-5, 5) has mean 0: {}", mean / episodes);
+            assert!(
+                (square / episodes - 25.0 / 3.0).abs() < 0.25,
+                "and variance 25 / 3: {}",
+                square / episodes
+            );
+        }
+        // Every rule begins with one obstacle behind, and at most one is left there.
+        assert!(negative as f64 / episodes > 1.9 && negative as f64 / episodes <= 2.0, "{negative}");
+    }
+
+    /// TTC = 2 s at the beginning of a 5 s step: both laterals are read after 2 / 5 of it.
+    #[test]
+    fn a_passing_is_judged_where_both_are_abeam() {
+        let mut field = Field::new(&calm(), 1);
+        field.agent.position = Vector2::new(100.0, 10.0);
+        field.agent.velocity = Vector2::new(3.0, 1.0);
+        let obstacle = &mut field.obstacles[2];
+        obstacle.velocity = Vector2::new(-2.0, 4.0);
+        obstacle.ttc_s = 2.0;
+        obstacle.linear = Vector2::new(110.0, 5.0);
+        let last = obstacle.history.len() - 1;
+        obstacle.history[last] = obstacle.linear;
+        field
+            .obstacles
+            .iter_mut()
+            .enumerate()
+            .filter(|(index, _)| *index != 2)
+            .for_each(|(_, o)| o.ttc_s = 1e6);
+        field.advance(0.0);
+        // The agent is at 10 + 1 * 2 = 12 m, the obstacle at 5 + 4 * 2 = 13 m.
+        let [passing] = field.passings() else { panic!("{:?}", field.passings()) };
+        assert_eq!((passing.obstacle, passing.wrong), (2, false), "right: the agent leaves it to port");
+        assert!((passing.lateral_m + 1.0).abs() < 1e-9, "{}", passing.lateral_m);
+        assert!((field.obstacles()[2].ttc_s + 3.0).abs() < 1e-12);
+        field.advance(0.0);
+        assert!(field.passings().is_empty(), "an obstacle is passed once");
+    }
 }
