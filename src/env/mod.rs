@@ -9,6 +9,9 @@ use thiserror::Error;
 
 pub mod coastal;
 pub mod open_water;
+pub mod registry;
+
+pub use registry::EnvName;
 
 /// What one decision brought.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -156,6 +156,18 @@ impl HeadOnStarts {
         starts
     }
 
+    /// Whether every start lies on one of these tracks, and is of its vessel.
+    #[must_use]
+    pub fn are_on(&self, tracks: &[Track]) -> bool {
+        let is_on = |start: &HeadOnStart| {
+            tracks
+                .get(start.track)
+                .is_some_and(|track| track.mmsi == start.mmsi && start.index < track.positions.len())
+        };
+        self.before_curve.iter().chain(&self.straight_on).all(is_on)
+            && self.tracks_without.iter().all(|&track| track < tracks.len())
+    }
+
     /// The starts of one scenario.
     #[must_use]
     pub fn of(&self, kind: HeadOnKind) -> &[HeadOnStart] {

@@ -15,6 +15,7 @@ pub mod placement;
 mod run;
 mod section;
 mod setup;
+pub mod starts_cache;
 pub mod streams;
 mod tracks;
 

@@ -100,6 +100,21 @@ pub struct CoastalConfig {
     pub tcpa_scale_s: f64,
 }
 
+impl CoastalConfig {
+    /// Obstacles in an episode: the recorded vessel and those that move in straight lines.
+    #[must_use]
+    pub fn obstacles(&self) -> usize {
+        1 + self.linear_obstacles
+    }
+
+    /// Length of an observation with or without estimates.
+    #[must_use]
+    pub fn observation_len(&self, estimates: bool) -> usize {
+        let per_obstacle = if estimates { 6 } else { 4 };
+        2 + per_obstacle * self.obstacles()
+    }
+}
+
 impl Default for CoastalConfig {
     fn default() -> Self {
         Self {

@@ -30,6 +30,7 @@
 //! | `too_close` | minus the number of obstacles within 300 m |
 
 mod config;
+pub mod observation;
 mod paths;
 mod record;
 mod situation;
@@ -39,12 +40,13 @@ pub use config::{CoastalConfig, EstimateSource, ScenarioChoice};
 pub use paths::{KnownPaths, LivePaths, Moment, Path, PathSource};
 pub use traffic::{Opening, SensorNoise};
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
+
+use observation::{SensedObstacle, SensedOwn};
 
 use super::{ActionError, Env, RewardTerm, Step, check_action};
 use crate::cpa::linear::closest_approach;
@@ -103,6 +105,19 @@ impl RecordedTraffic {
     /// When a scenario that `config` asks for has no start, or tracks differ in their time step.
     pub fn new(tracks: Vec<Track>, config: &CoastalConfig) -> Result<Self, CoastalError> {
         let starts = HeadOnStarts::find(&tracks, &config.head_on);
+        Self::with_starts(tracks, starts, config)
+    }
+
+    /// The same with starts that were found on these tracks before.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn with_starts(
+        tracks: Vec<Track>,
+        starts: HeadOnStarts,
+        config: &CoastalConfig,
+    ) -> Result<Self, CoastalError> {
         if let Some(&kind) = config.scenario.kinds().iter().find(|kind| starts.of(**kind).is_empty()) {
             return Err(CoastalError::NoStart { tracks: tracks.len(), kind });
         }
@@ -152,7 +167,6 @@ pub struct Coastal {
     /// Where the recorded vessel was last expected to go, and the time step at which.
     ahead: Option<(i64, Arc<[Position]>)>,
     estimates: Vec<Cpa>,
-    order: Vec<usize>,
     terms: [RewardTerm; 2],
     fallbacks: u64,
     body: VesselBody,
@@ -240,7 +254,6 @@ impl Coastal {
             states: Vec::new(),
             ahead: None,
             estimates: vec![Cpa::UNKNOWN; obstacles],
-            order: Vec::new(),
             terms: [
                 RewardTerm { name: "wrong_side", value: 0.0 },
                 RewardTerm { name: "too_close", value: 0.0 },
@@ -380,43 +393,24 @@ impl Coastal {
         Some(path.positions)
     }
 
-    fn observe(&mut self, episode: &Episode, observation: &mut [f32]) {
+    fn observe(&self, episode: &Episode, observation: &mut [f32]) {
         let step = episode.step(self.steps_per_decision());
         let own = self.states[0];
-        let own_position = self.sensed(episode, 0, step, own.position);
-        let config = &self.config;
-        let mut values = observation.iter_mut();
-        let mut write = |value: f64| {
-            if let Some(slot) = values.next() {
-                *slot = value as f32;
-            }
+        let position = self.sensed(episode, 0, step, own.position);
+        let own = SensedOwn {
+            position,
+            heading: own.heading,
+            speed_mps: own.velocity.speed_mps(),
+            cross_track_m: Self::cross_track_m(&episode.opening, position),
         };
-        write(own.velocity.speed_mps() / config.speed_scale_mps);
-        write(Self::cross_track_m(&episode.opening, own_position) / config.cross_track_scale_m);
-
-        let apart: Vec<_> = (1..self.states.len())
-            .map(|vessel| self.sensed(episode, vessel, step, self.states[vessel].position) - own_position)
+        let obstacles: Vec<SensedObstacle> = (1..self.states.len())
+            .map(|vessel| SensedObstacle {
+                position: self.sensed(episode, vessel, step, self.states[vessel].position),
+                velocity: self.states[vessel].velocity,
+                estimate: self.paths.is_some().then(|| self.estimates[vessel - 1]),
+            })
             .collect();
-        let has_estimates = self.paths.is_some();
-        let key = |index: usize| {
-            if has_estimates { self.estimates[index].distance_m } else { apart[index].length_m() }
-        };
-        self.order.clear();
-        self.order.extend(0..apart.len());
-        // A stable sort: ties stay with the lower index.
-        self.order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
-        for &index in &self.order {
-            let state = self.states[index + 1];
-            write((apart[index].length_m() - config.collision_distance_m) / config.distance_scale_m);
-            write(apart[index].bearing().turn_from(own.heading) / PI);
-            write(state.velocity.course().turn_from(own.heading) / PI);
-            write(state.velocity.speed_mps() / config.speed_scale_mps);
-            if has_estimates {
-                let estimate = self.estimates[index];
-                write((estimate.distance_m - config.collision_distance_m) / config.dcpa_scale_m);
-                write(estimate.time_s / config.tcpa_scale_s);
-            }
-        }
+        observation::observe(&self.config, &own, &obstacles, observation);
     }
 
     /// An episode at its start.
@@ -467,8 +461,7 @@ impl Coastal {
 
 impl Env for Coastal {
     fn observation_len(&self) -> usize {
-        let per_obstacle = if self.paths.is_some() { 6 } else { 4 };
-        2 + per_obstacle * (1 + self.config.linear_obstacles)
+        self.config.observation_len(self.paths.is_some())
     }
 
     fn action_len(&self) -> usize {

@@ -81,6 +81,15 @@ pub struct OpenWaterConfig {
     pub tcpa_scale_s: f64,
 }
 
+impl OpenWaterConfig {
+    /// Length of an observation with or without estimates.
+    #[must_use]
+    pub fn observation_len(&self, estimates: bool) -> usize {
+        let per_obstacle = if estimates { 4 } else { 2 };
+        3 + per_obstacle * 2 * self.obstacles_per_rule
+    }
+}
+
 impl Default for OpenWaterConfig {
     fn default() -> Self {
         Self {

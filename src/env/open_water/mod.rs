@@ -143,8 +143,7 @@ impl OpenWater {
 
 impl Env for OpenWater {
     fn observation_len(&self) -> usize {
-        let per_obstacle = if self.risk.is_some() { 4 } else { 2 };
-        3 + per_obstacle * 2 * self.config.obstacles_per_rule
+        self.config.observation_len(self.risk.is_some())
     }
 
     fn action_len(&self) -> usize {
