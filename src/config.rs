@@ -5,9 +5,11 @@
 //! the reader knows (a box upside down, a track that is not there) is reported by the reader
 //! through [`Source::error_at`], with the span of a [`toml::Spanned`] field.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// What is wrong in a configuration file, where, and what to do about it.
@@ -152,6 +154,30 @@ pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) ->
         Some(_) => format!("use one of {}", known.join(", ")),
         None => "remove it".to_owned(),
     }
+}
+
+/// The first key in which two configurations of one type differ, with dots, and both values as JSON.
+pub fn first_difference<T: Serialize>(theirs: &T, ours: &T) -> Option<(String, String, String)> {
+    let value = |config| serde_json::to_value(config).expect("plain data with string keys");
+    difference_below("", &value(theirs), &value(ours))
+}
+
+fn difference_below(
+    key: &str,
+    theirs: &serde_json::Value,
+    ours: &serde_json::Value,
+) -> Option<(String, String, String)> {
+    if let (Some(a), Some(b)) = (theirs.as_object(), ours.as_object()) {
+        let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+        return names.into_iter().find_map(|name| {
+            let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+            let of = |table: &serde_json::Map<String, serde_json::Value>| {
+                table.get(name).cloned().unwrap_or_default()
+            };
+            difference_below(&key, &of(a), &of(b))
+        });
+    }
+    (theirs != ours).then(|| (key.to_owned(), theirs.to_string(), ours.to_string()))
 }
 
 fn suggest(word: &str, serde_message: &str) -> String {

@@ -17,6 +17,7 @@ pub mod encounter;
 pub mod forecast;
 pub mod nn;
 
+pub mod agent;
 pub mod env;
 pub mod policy;
 pub mod report;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 fn searoom(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_searoom"));
-    command.current_dir(folder).args(arguments);
+    command.current_dir(folder).env("SEAROOM_CACHE", "off").args(arguments);
     command
 }
 
@@ -57,7 +57,22 @@ fn a_run_trains_is_evaluated_and_is_not_overwritten() {
     let evaluated = output(folder.path(), &["evaluate", "run", "--episodes", "3", "--json"]);
     let outcome: serde_json::Value = serde_json::from_str(&text(&evaluated).0).unwrap();
     assert_eq!(outcome["episodes"], 3);
-    assert!(outcome["mean_return"].as_f64().unwrap() <= 0.0);
+    let rows = outcome["rows"].as_array().unwrap();
+    let policies: Vec<_> = rows.iter().map(|row| row["policy"].as_str().unwrap()).collect();
+    assert_eq!(policies, ["run", "hold-course", "random"]);
+    for row in rows {
+        let [mean, wrong] =
+            ["mean_return", "wrong_passings_per_episode"].map(|key| row[key].as_f64().unwrap());
+        assert!(mean <= 0.0 && wrong == -mean, "wrong passings are minus the return");
+    }
+    let single = ["evaluate", "run", "--episodes", "3", "--json", "--threads", "1"];
+    assert_eq!(
+        text(&evaluated).0,
+        text(&output(folder.path(), &single)).0,
+        "the same on any number of threads"
+    );
+    let noisy = output(folder.path(), &["evaluate", "run", "--noise-m", "5"]);
+    assert!(text(&noisy).1.contains("no coastal run"), "{:?}", text(&noisy));
 
     let again = output(folder.path(), &[&TRAIN[..], &["--steps", "200"]].concat());
     assert!(!again.status.success());
@@ -86,6 +101,62 @@ fn a_killed_run_resumes_to_the_same_weights() {
         let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
         assert!(ours == theirs, "{file} differs");
     }
+}
+
+/// With a checkpoint after every decision the process is killed while it writes one, again and again.
+#[test]
+fn a_run_killed_while_it_writes_checkpoints_loses_nothing_else() {
+    let (straight, killed) = (folder(), folder());
+    let begin =
+        ["train", "--config", "run.toml", "--steps", "160", "--out", "run", "--checkpoint-every", "1"];
+    assert!(output(straight.path(), &begin).status.success());
+    let checkpoint = killed.path().join("run/checkpoint.safetensors");
+    for attempt in 0..6 {
+        let arguments: &[&str] =
+            if attempt == 0 { &begin } else { &["train", "--resume", "run", "--checkpoint-every", "1"] };
+        let before = fs::read(&checkpoint).ok();
+        let mut child = searoom(killed.path(), arguments).spawn().unwrap();
+        while fs::read(&checkpoint).ok() == before && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_micros(700 * attempt));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    let resumed = output(killed.path(), &["train", "--resume", "run", "--checkpoint-every", "1"]);
+    assert!(resumed.status.success(), "{:?}", text(&resumed));
+    for file in ["run/checkpoint.safetensors", "run/policy.safetensors", "run/evaluations.csv"] {
+        let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
+        assert!(ours == theirs, "{file} differs");
+    }
+}
+
+/// What is in a run's folder is never overwritten by what does not belong to it.
+#[test]
+fn another_configuration_and_damage_are_told_and_nothing_is_overwritten() {
+    let folder = folder();
+    assert!(output(folder.path(), &[&TRAIN[..], &["--steps", "120"]].concat()).status.success());
+    let [config, checkpoint] =
+        ["config.toml", "checkpoint.safetensors"].map(|file| folder.path().join("run").join(file));
+    let (settings, whole) = (fs::read_to_string(&config).unwrap(), fs::read(&checkpoint).unwrap());
+    let refused = |expected: &str| {
+        let resumed = output(folder.path(), &["train", "--resume", "run", "--steps", "200"]);
+        assert!(!resumed.status.success() && text(&resumed).1.contains(expected), "{:?}", text(&resumed));
+    };
+
+    fs::write(&config, settings.replace("hidden = 16", "hidden = 17")).unwrap();
+    refused("`agent.hidden` was 16 and is 17");
+    assert!(fs::read(&checkpoint).unwrap() == whole);
+
+    fs::write(&config, &settings).unwrap();
+    fs::write(&checkpoint, &whole[..whole.len() / 2]).unwrap();
+    refused("checkpoint.safetensors: not a safetensors file, or a truncated one");
+    assert_eq!(fs::read(&checkpoint).unwrap().len(), whole.len() / 2);
+
+    fs::write(&checkpoint, &whole).unwrap();
+    let begun = output(folder.path(), &[&TRAIN[..], &["--steps", "200"]].concat());
+    assert!(!begun.status.success());
+    assert!(fs::read(&checkpoint).unwrap() == whole && fs::read_to_string(&config).unwrap() == settings);
 }
 
 #[test]

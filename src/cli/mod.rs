@@ -10,9 +10,13 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod agent_run;
+mod agent_training;
 pub mod ais;
+mod cache;
 pub mod cpa;
+pub mod env;
 pub mod evaluate;
+pub mod export;
 pub mod forecast;
 pub mod progress;
 mod recorded;
@@ -60,10 +64,14 @@ subcommands! {
     Scenario(scenario),
     /// Train, measure and show forecasts of where vessels will go
     Forecast(forecast),
+    /// The environments that agents are trained in: what each shows, takes and rewards
+    Env(env),
     /// Train an agent to keep clear, with checkpoints that resume
     Train(train),
-    /// The return of a trained agent on episodes that it never saw
+    /// How a trained agent does on episodes that it never saw
     Evaluate(evaluate),
+    /// Put the agent of a run into one file
+    Export(export),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
     /// Closest point of approach of two vessels: closed form, sampled and refined

@@ -17,6 +17,7 @@ use super::agent::{Agent, NetworkState};
 use super::replay::{Chunk, Replay, ReplayShape};
 use super::trainer::{Trainer, TrainerConfig, TrainerState};
 use crate::atomic_file::{self, WriteError};
+use crate::config::first_difference;
 use crate::nn::weights::{WeightsError, WeightsFile, WeightsWriter};
 
 /// Name of the file in a run's folder.
@@ -152,6 +153,15 @@ pub fn config(folder: &Path) -> Result<TrainerConfig, CheckpointError> {
     Ok(read_record(&WeightsFile::open(&folder.join(FILE))?)?.config)
 }
 
+/// Decisions made before a checkpoint.
+///
+/// # Errors
+///
+/// When there is no whole checkpoint in the folder.
+pub fn step(folder: &Path) -> Result<u64, CheckpointError> {
+    Ok(read_record(&WeightsFile::open(&folder.join(FILE))?)?.state.step)
+}
+
 /// Puts `trainer`, made anew with the configuration of the run, to where the checkpoint was taken.
 ///
 /// # Errors
@@ -215,28 +225,12 @@ pub fn policy_weights(agent: &mut Agent) -> WeightsWriter {
 }
 
 fn same_config(path: &Path, theirs: &TrainerConfig, ours: &TrainerConfig) -> Result<(), CheckpointError> {
-    let value = |config| serde_json::to_value(config).expect("plain data with string keys");
-    match first_difference("", &value(theirs), &value(ours)) {
+    match first_difference(theirs, ours) {
         None => Ok(()),
         Some((key, theirs, ours)) => {
             Err(CheckpointError::OtherConfig { path: path.to_owned(), key, theirs, ours })
         }
     }
-}
-
-/// The first key in which two values differ, and both values.
-fn first_difference(
-    key: &str,
-    theirs: &serde_json::Value,
-    ours: &serde_json::Value,
-) -> Option<(String, String, String)> {
-    if let (Some(a), Some(b)) = (theirs.as_object(), ours.as_object()) {
-        return b.iter().find_map(|(name, value)| {
-            let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-            first_difference(&key, a.get(name).unwrap_or(&serde_json::Value::Null), value)
-        });
-    }
-    (theirs != ours).then(|| (key.to_owned(), theirs.to_string(), ours.to_string()))
 }
 
 fn chunk_bytes(chunk: &Chunk, shape: &ReplayShape) -> Vec<u8> {
