@@ -14,5 +14,6 @@ mod nn_allocation;
 mod replay;
 mod rl;
 mod scenario;
+mod sweep;
 mod train;
 mod vessel;

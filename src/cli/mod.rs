@@ -22,6 +22,7 @@ pub mod progress;
 mod recorded;
 mod run_log;
 pub mod scenario;
+pub mod sweep;
 pub mod table;
 pub mod train;
 pub mod vessel;
@@ -68,6 +69,8 @@ subcommands! {
     Env(env),
     /// Train an agent to keep clear, with checkpoints that resume
     Train(train),
+    /// Train a grid of agents and seeds over the available cores
+    Sweep(sweep),
     /// How a trained agent does on episodes that it never saw
     Evaluate(evaluate),
     /// Put the agent of a run into one file
