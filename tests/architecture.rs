@@ -89,6 +89,7 @@ fn networks_and_learning_know_no_ships() {
 #[test]
 fn files_are_touched_only_where_the_outside_world_is() {
     let outside = [
+        "agent/",
         "ais",
         "scenario",
         "forecast/",

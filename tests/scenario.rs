@@ -132,6 +132,8 @@ fn a_recorded_track_that_is_not_there_is_an_error_with_a_line() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("missing.toml");
     let text = std::fs::read_to_string(root("scenarios/head_on.toml")).unwrap();
+    let area = root("ais/ny-lower-bay.toml");
+    let text = text.replace("../ais/ny-lower-bay.toml", area.to_str().unwrap());
     let missing = text.replace("../ais/ny-harbor-2020-12.csv.gz", "no-such-file.csv.gz");
     std::fs::write(&file, missing).unwrap();
     let line = text.lines().position(|line| line.starts_with("ais_file")).unwrap() + 1;

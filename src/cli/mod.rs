@@ -18,6 +18,7 @@ pub mod env;
 pub mod evaluate;
 pub mod export;
 pub mod forecast;
+mod policies;
 pub mod progress;
 mod recorded;
 mod run_log;

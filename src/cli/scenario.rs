@@ -7,10 +7,10 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 use serde::Serialize;
 
+use super::policies::{self, Waters};
 use super::table::table;
 use crate::episode::{Episode, TargetSummary};
 use crate::geo::M_PER_NMI;
-use crate::policy;
 use crate::report::{self, EpisodeFiles};
 use crate::scenario::{ScenarioFile, StagedEncounter};
 
@@ -39,6 +39,7 @@ enum Command {
     #[command(after_help = "Examples:\n  \
         searoom scenario run scenarios/head_on.toml\n  \
         searoom scenario run scenarios/head_on.toml --policy rule-based --out out/rule-based\n  \
+        searoom scenario run scenarios/head_on.toml --policy runs/coastal-lstm-sac-seed-1\n  \
         searoom scenario run scenarios/head_on_curve.toml --seed 7 --json")]
     Run(RunArgs),
 }
@@ -47,8 +48,9 @@ enum Command {
 struct RunArgs {
     /// Scenario file
     file: PathBuf,
-    /// Who steers own ship, instead of the policy the file names
-    #[arg(long, value_parser = policy::NAMES)]
+    /// Who steers own ship, instead of the policy the file names: hold-course, rule-based, the folder of a run or the
+    /// file of an agent
+    #[arg(long)]
     policy: Option<String>,
     /// Seed of everything random, instead of the file's
     #[arg(long)]
@@ -149,14 +151,17 @@ fn described(staged: &StagedEncounter) -> String {
 
 fn run_scenario(args: &RunArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut file = ScenarioFile::load(&args.file)?;
-    if let Some(policy) = &args.policy {
-        file.scenario.policy.clone_from(policy);
-    }
     if let Some(seed) = args.seed {
         file.scenario.seed = seed;
     }
     let staged = file.set_up()?;
-    let episode = staged.run();
+    let name = args.policy.as_deref().unwrap_or(&staged.scenario.policy);
+    let waters = Waters { decision_s: staged.decision_s(), origin: staged.plane.map(|plane| plane.origin) };
+    let (mut policy, remark) = policies::open(name, &waters)?;
+    if let Some(remark) = remark {
+        eprintln!("note: {remark}");
+    }
+    let episode = staged.run_under(policy.as_mut());
     let directory = args.out.clone().unwrap_or_else(|| Path::new("out").join(&file.scenario.name));
     let files = report::write_episode(&episode, &directory)?;
     let outcome = Outcome::of(&episode, files);

@@ -12,10 +12,12 @@ use crate::vessel::Command;
 
 mod hold_course;
 mod rule_based;
+mod trained;
 
 pub use crate::route::Route;
 pub use hold_course::HoldCourse;
 pub use rule_based::{RuleBased, RuleBasedConfig};
+pub use trained::{TrainedPolicy, UnfitAgent};
 
 /// Own ship at a decision.
 #[derive(Debug, Clone, Copy, PartialEq)]

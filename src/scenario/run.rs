@@ -33,6 +33,12 @@ impl StagedEncounter {
         self.episode(policy.name(), steps)
     }
 
+    /// Time between two decisions, in seconds: whole time steps.
+    #[must_use]
+    pub fn decision_s(&self) -> f64 {
+        self.steps_per_decision() as f64 * self.scenario.dt_s
+    }
+
     fn steps_per_decision(&self) -> usize {
         let interval_s = self.scenario.own_ship.steering.decision_interval_s;
         (interval_s / self.scenario.dt_s).round().max(1.0) as usize
@@ -128,7 +134,7 @@ impl<'s> Voyage<'s> {
         let command = policy.decide(&Situation {
             time_s: self.step as f64 * scenario.dt_s,
             dt_s: scenario.dt_s,
-            decision_s: self.staged.steps_per_decision() as f64 * scenario.dt_s,
+            decision_s: self.staged.decision_s(),
             own,
             route: &self.staged.route,
             targets: &targets,
