@@ -4,11 +4,12 @@
 use std::fs;
 
 use searoom::angle::Nautical;
-use searoom::geo::Position;
+use searoom::geo::{Position, Velocity};
 use searoom::policy::{
     HoldCourse, OwnShip, Policy, Route, RuleBased, RuleBasedConfig, Situation, TargetShip,
 };
-use searoom::vessel::{Dynamics, DynamicsConfig};
+use searoom::vessel::mmg::Surroundings;
+use searoom::vessel::{Dynamics, DynamicsConfig, KinematicConfig, Launch, Steered};
 use searoom::world::{Bow, Hull, VesselBody, World, WorldConfig};
 use serde_json::Value;
 
@@ -56,6 +57,25 @@ fn zigzag_prints_overshoots_beside_the_measured_ones() {
 }
 
 #[test]
+fn current_and_wind_are_stated_and_nothing_published_stands_beside_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let still = json(&["vessel", "turn"], folder.path());
+    assert!(still.get("surroundings").is_none());
+    let arguments = ["vessel", "turn", "--current-towards-deg", "90", "--current-kn", "2"];
+    let results = json(&arguments, folder.path());
+    assert_eq!(results["surroundings"]["current_towards_deg"], 90.0);
+    assert!(results["starboard"].get("published").is_none());
+    let diameter = |results: &Value, side: &str| {
+        results[side]["tactical_diameter_over_length"].as_f64().expect("an index")
+    };
+    assert!(diameter(&results, "starboard") > diameter(&still, "starboard") + 1.0);
+    assert!(diameter(&results, "port") < diameter(&still, "port") - 1.0);
+    let output = searoom(&["vessel", "turn", "--wind-kn", "20"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--wind-from-deg"));
+}
+
+#[test]
 fn an_angle_that_no_rudder_has_is_refused_with_a_remedy() {
     for arguments in [["vessel", "turn", "--rudder-deg", "90"], ["vessel", "zigzag", "--angle-deg", "NaN"]] {
         let output = searoom(&arguments);
@@ -65,14 +85,21 @@ fn an_angle_that_no_rudder_has_is_refused_with_a_remedy() {
     }
 }
 
+/// KVLCC2 under way in still water.
+fn tanker(position: Position, course: Nautical, speed_mps: f64) -> Box<dyn Steered> {
+    let config = DynamicsConfig { dynamics: Dynamics::Kvlcc2, ..DynamicsConfig::default() };
+    let velocity = Velocity::from_course(course, speed_mps);
+    let limits = KinematicConfig { max_turn_deg: 10.0 };
+    config.launch(&Launch { position, velocity, limits }, Surroundings::default())
+}
+
 /// Two KVLCC2 meet head-on, the other holding its course; the least distances of centres and hulls.
 fn tankers_head_on(policy: &mut dyn Policy) -> (f64, f64) {
     const RANGE_M: f64 = 12_000.0;
     const DT_S: f64 = 5.0;
-    let config = DynamicsConfig { dynamics: Dynamics::Kvlcc2, ..DynamicsConfig::default() };
-    let mut own = config.launch(Position::ORIGIN, Nautical::NORTH, 7.0);
+    let mut own = tanker(Position::ORIGIN, Nautical::NORTH, 7.0);
     let start = Position { north_m: RANGE_M, east_m: 0.0 };
-    let mut other = config.launch(start, Nautical::from_degrees(180.0), 7.0);
+    let mut other = tanker(start, Nautical::from_degrees(180.0), 7.0);
 
     let mut world = World::new(WorldConfig { dt_s: DT_S, ..WorldConfig::default() });
     let hull = Hull::new(320.0, 58.0, Bow::Full).expect("a hull");

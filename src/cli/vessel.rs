@@ -8,13 +8,15 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::table::table;
+use crate::angle::Nautical;
 use crate::atomic_file;
+use crate::geo::{MPS_PER_KNOT, Velocity};
 use crate::report::figure::{Figure, Line, Panel, colour};
 use crate::vessel::mmg::manoeuvre::{ManoeuvreConfig, Moment, TurningCircle, ZigZag, turning_circle, zigzag};
 use crate::vessel::mmg::published::{
     IMO_ADVANCE, IMO_TACTICAL_DIAMETER, PublishedTurn, PublishedZigZag, TURN_PORT, TURN_STARBOARD, ZIGZAGS,
 };
-use crate::vessel::mmg::{Hydrodynamics, MmgParameters, ParameterSet};
+use crate::vessel::mmg::{Hydrodynamics, MmgParameters, ParameterSet, Surroundings, Wind};
 
 /// Rudder angle of the published turning circles, in degrees.
 const PUBLISHED_RUDDER_DEG: f64 = 35.0;
@@ -31,7 +33,10 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Turning circles of KVLCC2 to both sides
-    #[command(after_help = "Examples:\n  searoom vessel turn\n  searoom vessel turn --rudder-deg 20 --json")]
+    #[command(
+        after_help = "Examples:\n  searoom vessel turn\n  searoom vessel turn --rudder-deg 20 --json\n  \
+        searoom vessel turn --current-towards-deg 90 --current-kn 2 --wind-from-deg 45 --wind-kn 30"
+    )]
     Turn(TurnArgs),
     /// Zig-zag tests of KVLCC2, starting to either side
     #[command(
@@ -48,6 +53,18 @@ struct CommonArgs {
     /// Rate at which the rudder moves [default: that of the publication, 1.76]
     #[arg(long)]
     rudder_rate_deg_per_s: Option<f64>,
+    /// Direction that a current sets towards, clockwise from the approach course
+    #[arg(long, requires = "current_kn", allow_negative_numbers = true)]
+    current_towards_deg: Option<f64>,
+    /// Speed of the current
+    #[arg(long, requires = "current_towards_deg")]
+    current_kn: Option<f64>,
+    /// Direction that a wind blows from, clockwise from the approach course
+    #[arg(long, requires = "wind_kn", allow_negative_numbers = true)]
+    wind_from_deg: Option<f64>,
+    /// Speed of the wind
+    #[arg(long, requires = "wind_from_deg")]
+    wind_kn: Option<f64>,
     /// Directory for the picture and the time series [default: out/turn or out/zigzag]
     #[arg(long)]
     out: Option<PathBuf>,
@@ -98,6 +115,50 @@ impl CommonArgs {
         in_range("--rudder-rate-deg-per-s", rate, 0.1, 100.0)?;
         Ok(Hydrodynamics::new(MmgParameters { rudder_rate_deg_per_s: rate, ..parameters }))
     }
+
+    fn manoeuvre(&self) -> anyhow::Result<ManoeuvreConfig> {
+        let direction = |option: &str, degrees: f64| -> anyhow::Result<Nautical> {
+            in_range(option, degrees, -360.0, 360.0)?;
+            Ok(Nautical::from_degrees(degrees))
+        };
+        let mut surroundings = Surroundings::default();
+        if let (Some(towards_deg), Some(speed_kn)) = (self.current_towards_deg, self.current_kn) {
+            in_range("--current-kn", speed_kn, 0.0, 20.0)?;
+            let towards = direction("--current-towards-deg", towards_deg)?;
+            surroundings.current = Velocity::from_course(towards, speed_kn * MPS_PER_KNOT);
+        }
+        if let (Some(from_deg), Some(speed_kn)) = (self.wind_from_deg, self.wind_kn) {
+            in_range("--wind-kn", speed_kn, 0.0, 100.0)?;
+            let from = direction("--wind-from-deg", from_deg)?;
+            surroundings.wind = Some(Wind { from, speed_mps: speed_kn * MPS_PER_KNOT });
+        }
+        Ok(ManoeuvreConfig { surroundings, ..ManoeuvreConfig::default() })
+    }
+
+    fn surroundings(&self) -> WrittenSurroundings {
+        WrittenSurroundings {
+            current_towards_deg: self.current_towards_deg,
+            current_kn: self.current_kn,
+            wind_from_deg: self.wind_from_deg,
+            wind_kn: self.wind_kn,
+        }
+    }
+}
+
+/// Current and wind as they were given; nothing where there is none.
+#[derive(Debug, PartialEq, Serialize)]
+struct WrittenSurroundings {
+    current_towards_deg: Option<f64>,
+    current_kn: Option<f64>,
+    wind_from_deg: Option<f64>,
+    wind_kn: Option<f64>,
+}
+
+impl WrittenSurroundings {
+    /// Still water and air, for which results are published.
+    fn are_still(&self) -> bool {
+        self.current_kn.is_none() && self.wind_kn.is_none()
+    }
 }
 
 fn in_range(option: &str, value: f64, least: f64, most: f64) -> anyhow::Result<()> {
@@ -129,6 +190,8 @@ struct TurnSide {
 #[derive(Debug, Serialize)]
 struct TurnResults {
     parameters: ParameterSet,
+    #[serde(skip_serializing_if = "WrittenSurroundings::are_still")]
+    surroundings: WrittenSurroundings,
     starboard: TurnSide,
     port: TurnSide,
 }
@@ -136,11 +199,13 @@ struct TurnResults {
 fn turn(args: &TurnArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let ship = args.common.ship()?;
     in_range("--rudder-deg", args.rudder_deg, 1.0, ship.max_rudder_rad().to_degrees() + 1e-9)?;
+    let (config, surroundings) = (args.common.manoeuvre()?, args.common.surroundings());
+    let is_published = args.rudder_deg == PUBLISHED_RUDDER_DEG && surroundings.are_still();
     let side = |sign: f64, published: PublishedTurn| -> anyhow::Result<(TurnSide, Vec<Moment>)> {
         let rudder_rad = (sign * args.rudder_deg).to_radians();
-        let (circle, moments) = turning_circle(&ship, rudder_rad, ManoeuvreConfig::default())
+        let (circle, moments) = turning_circle(&ship, rudder_rad, config)
             .ok_or_else(|| anyhow!("the ship does not come round within an hour: give more rudder"))?;
-        let published = (args.rudder_deg == PUBLISHED_RUDDER_DEG).then_some(published);
+        let published = is_published.then_some(published);
         Ok((TurnSide { circle, published }, moments))
     };
     let (starboard, starboard_track) = side(1.0, TURN_STARBOARD)?;
@@ -152,7 +217,7 @@ fn turn(args: &TurnArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let length_m = ship.parameters().length_m;
     write_figure(&folder.join("turn.svg"), &turn_figure(&starboard_track, &port_track, length_m))?;
 
-    let results = TurnResults { parameters: args.common.parameters.into(), starboard, port };
+    let results = TurnResults { parameters: args.common.parameters.into(), surroundings, starboard, port };
     if args.common.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
         return Ok(());
@@ -248,6 +313,8 @@ struct ZigZagResult {
 #[derive(Debug, Serialize)]
 struct ZigZagResults {
     parameters: ParameterSet,
+    #[serde(skip_serializing_if = "WrittenSurroundings::are_still")]
+    surroundings: WrittenSurroundings,
     tests: Vec<ZigZagResult>,
 }
 
@@ -255,19 +322,20 @@ fn zigzags(args: &ZigzagArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let ship = args.common.ship()?;
     let angles = if args.angle_deg.is_empty() { vec![10.0, 20.0] } else { args.angle_deg.clone() };
     let folder = args.common.out.clone().unwrap_or_else(|| PathBuf::from("out/zigzag"));
+    let (config, surroundings) = (args.common.manoeuvre()?, args.common.surroundings());
     let (mut tests, mut panels) = (Vec::new(), Vec::new());
     for angle_deg in angles {
         in_range("--angle-deg", angle_deg, 1.0, ship.max_rudder_rad().to_degrees() + 1e-9)?;
         for starboard_first in [true, false] {
             let angle_rad = angle_deg.to_radians();
-            let (test, moments) =
-                zigzag(&ship, angle_rad, angle_rad, starboard_first, ManoeuvreConfig::default())
-                    .ok_or_else(|| anyhow!("the ship does not answer within an hour: give more rudder"))?;
+            let (test, moments) = zigzag(&ship, angle_rad, angle_rad, starboard_first, config)
+                .ok_or_else(|| anyhow!("the ship does not answer within an hour: give more rudder"))?;
             let side = if starboard_first { "starboard" } else { "port" };
             write_series(&folder.join(format!("{angle_deg}_{side}_first.csv")), &moments)?;
             panels.push(zigzag_panel(&format!("{angle_deg}/{angle_deg} deg, {side} first"), &moments));
             let measured_overshoots_deg = ZIGZAGS
                 .iter()
+                .filter(|_| surroundings.are_still())
                 .find(|known| known.angle_deg == angle_deg && known.starboard_first == starboard_first)
                 .map(|known: &PublishedZigZag| known.overshoots_deg);
             tests.push(ZigZagResult { test, measured_overshoots_deg });
@@ -275,7 +343,7 @@ fn zigzags(args: &ZigzagArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     }
     write_figure(&folder.join("zigzag.svg"), &Figure { panels, columns: 2 })?;
 
-    let results = ZigZagResults { parameters: args.common.parameters.into(), tests };
+    let results = ZigZagResults { parameters: args.common.parameters.into(), surroundings, tests };
     if args.common.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
         return Ok(());

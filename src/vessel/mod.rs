@@ -22,13 +22,13 @@ pub mod recorded;
 pub mod stochastic;
 pub mod waypoints;
 
-pub use dynamics::{Dynamics, DynamicsConfig};
+pub use dynamics::{Dynamics, DynamicsConfig, Launch};
 pub use kinematic::{Kinematic, KinematicConfig};
 pub use linear::Linear;
-pub use mmg::{MmgConfig, MmgShip};
+pub use mmg::{Kvlcc2Config, MmgConfig, MmgShip};
 pub use offsets::{OffsetProcess, Span, Wandering};
 pub use periodic::PeriodicConfig;
-pub use piloted::Piloted;
+pub use piloted::{Pilot, PilotConfig, Piloted};
 pub use recorded::Recorded;
 pub use stochastic::StochasticConfig;
 pub use waypoints::{Waypoint, Waypoints, WaypointsError};

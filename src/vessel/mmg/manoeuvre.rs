@@ -1,8 +1,10 @@
 //! The standard manoeuvres: turning circle and zig-zag.
 //!
-//! The ship comes up to them on a straight course at its design speed and keeps its revolutions. The
-//! rudder moves at its rate from time 0. Indices are of midship's track, along and across the
-//! approach course, over the ship's length (IMO resolution MSC.137(76); ITTC 7.5-02-06-01).
+//! The ship comes up to them on a straight course, due north, at its design speed through the water, and
+//! keeps its revolutions. The rudder moves at its rate from time 0. Indices are of midship's track over
+//! ground, along and across the approach course, over the ship's length (IMO resolution MSC.137(76);
+//! ITTC 7.5-02-06-01). A current carries that track along, wind acts from time 0 on; what is published is
+//! for still water and air.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -17,11 +19,13 @@ pub struct ManoeuvreConfig {
     pub step_s: f64,
     /// When to give up, in seconds.
     pub limit_s: f64,
+    /// Current and wind; the approach course is due north.
+    pub surroundings: Surroundings,
 }
 
 impl Default for ManoeuvreConfig {
     fn default() -> Self {
-        Self { step_s: 0.1, limit_s: 3600.0 }
+        Self { step_s: 0.1, limit_s: 3600.0, surroundings: Surroundings::default() }
     }
 }
 
@@ -126,7 +130,7 @@ impl<'a> Run<'a> {
                 &self.motion,
                 &self.actuators,
                 ordered_rudder_rad,
-                &Surroundings::default(),
+                &self.config.surroundings,
                 self.config.step_s,
             );
             self.time_s += self.config.step_s;
@@ -141,7 +145,7 @@ impl<'a> Run<'a> {
     /// Time and motion at which the heading had changed by `turned_rad`: less than one step back from
     /// now, in a straight line.
     fn at_heading(&self, turned_rad: f64) -> (f64, MmgMotion) {
-        let rate = derivative(self.ship, &self.motion, &self.actuators, &Surroundings::default());
+        let rate = derivative(self.ship, &self.motion, &self.actuators, &self.config.surroundings);
         let back_s = (self.motion.heading_rad.abs() - turned_rad) / rate.heading_rad.abs();
         (self.time_s - back_s, self.motion.plus(&rate, -back_s))
     }
@@ -216,8 +220,10 @@ pub fn zigzag(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::angle::Nautical;
+    use crate::geo::Velocity;
     use crate::vessel::mmg::published::{PublishedTurn, TURN_PORT, TURN_STARBOARD, ZIGZAGS};
-    use crate::vessel::mmg::{MmgParameters, ParameterSet};
+    use crate::vessel::mmg::{MmgParameters, ParameterSet, Wind};
 
     fn kvlcc2() -> Hydrodynamics {
         Hydrodynamics::new(MmgParameters::default())
@@ -238,6 +244,8 @@ mod tests {
         within(circle.advance_over_length, published.advance_measured, 0.10);
         within(circle.tactical_diameter_over_length, published.tactical_diameter_measured, 0.10);
         within(circle.transfer_over_length, published.transfer_measured, 0.20);
+        // The drift angle is positive to port of the bow: in a turn to either side the bow lies inside.
+        assert!((10.0..30.0).contains(&circle.steady_drift_deg), "{circle:?}");
     }
 
     #[test]
@@ -273,8 +281,10 @@ mod tests {
                 within(*value, measured, 0.35);
             }
         }
-        let (starboard, port) = (overshoots(10.0, true), overshoots(10.0, false));
-        assert!(starboard[0] < port[0] && starboard[1] > port[1], "{starboard:?} {port:?}");
+        for angle_deg in [10.0, 20.0] {
+            let (starboard, port) = (overshoots(angle_deg, true), overshoots(angle_deg, false));
+            assert!(starboard[0] < port[0] && starboard[1] > port[1], "{starboard:?} {port:?}");
+        }
     }
 
     /// Convergence of the integration: a tenth of a second is as good as a hundredth.
@@ -292,5 +302,36 @@ mod tests {
         let config = ManoeuvreConfig { limit_s: 60.0, ..ManoeuvreConfig::default() };
         assert!(turning_circle(&kvlcc2(), 0.6, config).is_none());
         assert!(zigzag(&kvlcc2(), 0.1, 0.5, true, config).is_none());
+    }
+
+    fn turn_in(surroundings: Surroundings) -> TurningCircle {
+        let config = ManoeuvreConfig { surroundings, ..ManoeuvreConfig::default() };
+        turning_circle(&kvlcc2(), 35_f64.to_radians(), config).expect("a full circle").0
+    }
+
+    #[test]
+    fn a_current_carries_the_circle_towards_where_it_sets() {
+        let still = turn_in(Surroundings::default());
+        let current = Velocity::from_course(Nautical::from_degrees(90.0), 1.0);
+        let drifting = turn_in(Surroundings { current, wind: None });
+        assert!((drifting.time_to_180_s - still.time_to_180_s).abs() < 1e-9);
+        assert!((drifting.advance_over_length - still.advance_over_length).abs() < 1e-9);
+        let carried = drifting.tactical_diameter_over_length - still.tactical_diameter_over_length;
+        assert!((carried - still.time_to_180_s / 320.0).abs() < 1e-9, "{carried}");
+    }
+
+    #[test]
+    fn a_wind_sets_the_circle_away_from_where_it_blows_from() {
+        let transfer = |from_deg: f64| {
+            let wind = Some(Wind { from: Nautical::from_degrees(from_deg), speed_mps: 20.0 });
+            turn_in(Surroundings { wind, ..Surroundings::default() }).transfer_over_length
+        };
+        let still = turn_in(Surroundings::default()).transfer_over_length;
+        assert!(
+            transfer(90.0) < still && still < transfer(270.0),
+            "{} {still} {}",
+            transfer(90.0),
+            transfer(270.0)
+        );
     }
 }

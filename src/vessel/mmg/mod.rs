@@ -19,11 +19,13 @@
 //! autopilot; [`manoeuvre`] runs the standard tests.
 
 pub mod dynamics;
+mod kvlcc2;
 pub mod manoeuvre;
 mod parameters;
 pub mod published;
 mod ship;
 
 pub use dynamics::{Actuators, Hydrodynamics, MmgMotion, Surroundings, Wind};
+pub use kvlcc2::{Kvlcc2Config, Kvlcc2Error};
 pub use parameters::{MmgParameters, ParameterSet, Windage};
 pub use ship::{AutopilotConfig, MmgConfig, MmgShip};

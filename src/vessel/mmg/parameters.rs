@@ -173,6 +173,44 @@ pub struct MmgParameters {
     pub windage: Windage,
 }
 
+impl MmgParameters {
+    /// A ship of the same form with another length, after Froude's law of similarity: lengths go with
+    /// the scale, areas with its square, volumes with its cube, times and speeds with its root. All
+    /// coefficients stay, as if friction followed the same law: at equal Froude numbers the ship makes
+    /// the same track, over its length.
+    #[must_use]
+    pub fn scaled_to(self, length_m: f64) -> Self {
+        let scale = length_m / self.length_m;
+        let (square, root) = (scale * scale, scale.sqrt());
+        Self {
+            length_m,
+            beam_m: self.beam_m * scale,
+            draught_m: self.draught_m * scale,
+            displacement_m3: self.displacement_m3 * square * scale,
+            centre_of_gravity_m: self.centre_of_gravity_m * scale,
+            design_speed_mps: self.design_speed_mps * root,
+            propeller_diameter_m: self.propeller_diameter_m * scale,
+            rudder_area_m2: self.rudder_area_m2 * square,
+            rudder_height_m: self.rudder_height_m * scale,
+            rudder_rate_deg_per_s: self.rudder_rate_deg_per_s / root,
+            low_speed_mps: self.low_speed_mps * root,
+            windage: Windage {
+                frontal_area_m2: self.windage.frontal_area_m2 * square,
+                lateral_area_m2: self.windage.lateral_area_m2 * square,
+                ..self.windage
+            },
+            ..self
+        }
+    }
+
+    /// The time in which the ship makes its length at its design speed, in seconds: the unit that
+    /// manoeuvres are measured in.
+    #[must_use]
+    pub fn time_unit_s(&self) -> f64 {
+        self.length_m / self.design_speed_mps
+    }
+}
+
 impl Default for MmgParameters {
     fn default() -> Self {
         Self {
