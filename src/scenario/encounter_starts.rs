@@ -9,6 +9,7 @@
 //! two vessels come is exact between samples, both moving in straight lines within a step.
 
 use std::collections::BTreeSet;
+use std::f64::consts::FRAC_PI_2;
 
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -18,6 +19,8 @@ use serde::{Deserialize, Serialize};
 use crate::angle::Nautical;
 use crate::geo::{Displacement, Position, Velocity};
 use crate::track::Track;
+use crate::vessel::mmg::{Kvlcc2Error, Surroundings};
+use crate::vessel::{Command, Dynamics, DynamicsConfig, KinematicConfig, Kvlcc2Config, Launch, Steered};
 
 /// Which of the two head-on scenarios of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -43,6 +46,10 @@ pub struct HeadOnConfig {
     pub turn_per_decision_deg: f64,
     /// Time between two decisions, in seconds.
     pub decision_interval_s: f64,
+    /// Own ship's dynamics.
+    pub dynamics: Dynamics,
+    /// Settings of [`Dynamics::Kvlcc2`].
+    pub kvlcc2: Kvlcc2Config,
     /// Track wanted before the start, in seconds.
     pub history_s: f64,
     /// Track wanted after the start, over which distances are judged, in seconds.
@@ -77,6 +84,8 @@ impl Default for HeadOnConfig {
             time_to_collision_s: 240.0,
             turn_per_decision_deg: 2.4,
             decision_interval_s: 20.0,
+            dynamics: Dynamics::default(),
+            kvlcc2: Kvlcc2Config::default(),
             history_s: 375.0,
             future_s: 300.0,
             spacing_s: 30.0,
@@ -90,6 +99,28 @@ impl Default for HeadOnConfig {
             straight_starboard_offset_m: 50.0,
             clear_m: 350.0,
         }
+    }
+}
+
+impl HeadOnConfig {
+    /// Checks own ship's dynamics.
+    ///
+    /// # Errors
+    /// Names the key at fault and says what to write.
+    pub fn check_dynamics(&self) -> Result<(), Kvlcc2Error> {
+        match self.dynamics {
+            Dynamics::Kinematic => Ok(()),
+            Dynamics::Kvlcc2 => self.kvlcc2.check(self.own_speed_mps),
+        }
+    }
+
+    /// Own ship on a course at its speed, in still water, as it is steered in these encounters.
+    #[must_use]
+    pub fn launch_own(&self, position: Position, course: Nautical) -> Box<dyn Steered> {
+        let dynamics = DynamicsConfig { dynamics: self.dynamics, kvlcc2: self.kvlcc2 };
+        let limits = KinematicConfig { max_turn_deg: self.turn_per_decision_deg };
+        let velocity = Velocity::from_course(course, self.own_speed_mps);
+        dynamics.launch(&Launch { position, velocity, limits }, Surroundings::default())
     }
 }
 
@@ -210,6 +241,10 @@ fn distinct<T: Ord>(items: impl Iterator<Item = T>) -> Vec<T> {
 fn search(track: &Track, config: &HeadOnConfig) -> Vec<(HeadOnKind, usize)> {
     let steps = |duration_s: f64| (duration_s / track.dt_s).round().max(0.0) as usize;
     let (history, future) = (steps(config.history_s), steps(config.future_s));
+    let own = OwnWays {
+        hold: sail(0.0, track.dt_s, future, config),
+        turn: sail(config.turn_per_decision_deg, track.dt_s, future, config),
+    };
     let candidates =
         (history..track.positions.len().saturating_sub(future)).step_by(steps(config.spacing_s).max(1));
     candidates
@@ -219,13 +254,34 @@ fn search(track: &Track, config: &HeadOnConfig) -> Vec<(HeadOnKind, usize)> {
                 particulars: Default::default(),
                 ..*track
             };
-            classify(&window, config).map(|kind| (kind, index))
+            classify(&window, &own, config).map(|kind| (kind, index))
+        })
+        .collect()
+}
+
+/// What own ship can do from any start: ways made at the target's samples, as from the origin towards
+/// north. In still water they are the same on every course.
+struct OwnWays {
+    /// Holding its course.
+    hold: Vec<Position>,
+    /// Turning to starboard at every decision.
+    turn: Vec<Position>,
+}
+
+/// A way made towards north, from another start.
+fn from_start(way: &[Position], start: HeadOnPose) -> Vec<Position> {
+    let abeam = start.course.turned(FRAC_PI_2);
+    way.iter()
+        .map(|made| {
+            start.position
+                + Displacement::towards(start.course, made.north_m)
+                + Displacement::towards(abeam, made.east_m)
         })
         .collect()
 }
 
 /// Which scenario starts at the first position of `target`, judged over its whole length.
-fn classify(target: &Track, config: &HeadOnConfig) -> Option<HeadOnKind> {
+fn classify(target: &Track, own: &OwnWays, config: &HeadOnConfig) -> Option<HeadOnKind> {
     let velocity = target.velocity(0);
     if !(config.speed_min_mps..=config.speed_max_mps).contains(&velocity.speed_mps()) {
         return None;
@@ -240,9 +296,8 @@ fn classify(target: &Track, config: &HeadOnConfig) -> Option<HeadOnKind> {
     }
 
     let start = head_on_pose(target.positions[0], velocity, config.own_speed_mps, config.time_to_collision_s);
-    let hold = closest_approach(&sail(start, 0.0, target, config), &target.positions);
-    let turn =
-        closest_approach(&sail(start, config.turn_per_decision_deg, target, config), &target.positions);
+    let hold = closest_approach(&from_start(&own.hold, start), &target.positions);
+    let turn = closest_approach(&from_start(&own.turn, start), &target.positions);
     if curves {
         let fits = hold.length_m() >= config.clear_m && turn.length_m() <= config.curve_contact_m;
         return fits.then_some(HeadOnKind::BeforeCurve);
@@ -253,17 +308,19 @@ fn classify(target: &Track, config: &HeadOnConfig) -> Option<HeadOnKind> {
     fits.then_some(HeadOnKind::StraightOn)
 }
 
-/// Own ship's positions at the target's samples, its heading changed by `turn_deg` to starboard at
-/// every decision, the first one included.
-fn sail(start: HeadOnPose, turn_deg: f64, target: &Track, config: &HeadOnConfig) -> Vec<Position> {
-    let interval = (config.decision_interval_s / target.dt_s).round().max(1.0) as usize;
-    let mut position = start.position;
-    let mut positions = vec![position];
-    for step in 0..target.positions.len() - 1 {
-        let decisions = (step / interval + 1) as f64;
-        let course = start.course.turned((turn_deg * decisions).to_radians());
-        position += Displacement::towards(course, config.own_speed_mps * target.dt_s);
-        positions.push(position);
+/// Own ship's positions over `steps` time steps from the origin towards north, its ordered heading
+/// changed by `turn_deg` to starboard at every decision, the first one included.
+fn sail(turn_deg: f64, dt_s: f64, steps: usize, config: &HeadOnConfig) -> Vec<Position> {
+    let interval = (config.decision_interval_s / dt_s).round().max(1.0) as usize;
+    let turn = Command { turn_rad: turn_deg.to_radians(), speed_mps: None };
+    let mut ship = config.launch_own(Position::ORIGIN, Nautical::NORTH);
+    let mut positions = vec![Position::ORIGIN];
+    for step in 0..steps {
+        if step % interval == 0 {
+            ship.order(turn);
+        }
+        ship.advance(dt_s);
+        positions.push(ship.state().position);
     }
     positions
 }

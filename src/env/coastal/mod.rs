@@ -3,7 +3,7 @@
 //!
 //! Obstacle 1 replays a recorded track: in scenario 1 it is about to turn to port and clear, in scenario
 //! 2 it goes straight on. Three more move in straight lines. Own ship changes its heading once every
-//! 20 s.
+//! 20 s; with the dynamics of KVLCC2 it changes the heading that its autopilot is to steer.
 //!
 //! | action | range | unit |
 //! | --- | --- | --- |
@@ -55,7 +55,8 @@ use crate::forecast::{Basis, Forecaster};
 use crate::geo::Position;
 use crate::scenario::encounter_starts::{HeadOnKind, HeadOnStart, HeadOnStarts};
 use crate::track::Track;
-use crate::vessel::{Command, Kinematic, KinematicConfig, Linear, Motion, Recorded, Steered, VesselState};
+use crate::vessel::mmg::Kvlcc2Error;
+use crate::vessel::{Command, Dynamics, Linear, Motion, Recorded, Steered, VesselState};
 use crate::world::{Bow, Hull, HullError, PairReport, VesselBody, VesselId, World, WorldConfig};
 
 /// Why there is no coastal environment.
@@ -87,6 +88,9 @@ pub enum CoastalError {
     /// The configured hull is none.
     #[error(transparent)]
     Hull(#[from] HullError),
+    /// Own ship's dynamics cannot be.
+    #[error("head_on.kvlcc2.{0}")]
+    Dynamics(#[from] Kvlcc2Error),
 }
 
 /// The recorded vessels of an area and the starts found on their tracks; shared by many environments.
@@ -102,8 +106,10 @@ impl RecordedTraffic {
     ///
     /// # Errors
     ///
-    /// When a scenario that `config` asks for has no start, or tracks differ in their time step.
+    /// When a scenario that `config` asks for has no start, tracks differ in their time step, or own ship's
+    /// dynamics cannot be.
     pub fn new(tracks: Vec<Track>, config: &CoastalConfig) -> Result<Self, CoastalError> {
+        config.head_on.check_dynamics()?;
         let starts = HeadOnStarts::find(&tracks, &config.head_on);
         Self::with_starts(tracks, starts, config)
     }
@@ -178,7 +184,7 @@ pub struct Coastal {
 struct Episode {
     seed: u64,
     opening: Opening,
-    own: Kinematic,
+    own: Box<dyn Steered>,
     /// Where own ship has been, from the start on.
     own_path: Vec<Position>,
     recorded: Recorded,
@@ -213,7 +219,7 @@ impl Coastal {
     ///
     /// # Errors
     ///
-    /// When the configured hull is none.
+    /// When the configured hull is none, or own ship's dynamics cannot be.
     pub fn new(
         config: CoastalConfig,
         traffic: Arc<RecordedTraffic>,
@@ -241,7 +247,9 @@ impl Coastal {
         let mut world = World::new(WorldConfig { dt_s: traffic.dt_s, ..WorldConfig::default() });
         let nowhere = VesselState::on_course(Position::ORIGIN, crate::angle::Nautical::NORTH, 0.0);
         let obstacles = 1 + config.linear_obstacles;
-        let ids: Vec<VesselId> = (0..=obstacles).map(|_| world.add_vessel(body.clone(), nowhere)).collect();
+        let own_body = own_body(&config, &body)?;
+        let bodies = std::iter::once(&own_body).chain(std::iter::repeat_n(&body, obstacles));
+        let ids: Vec<VesselId> = bodies.map(|body| world.add_vessel(body.clone(), nowhere)).collect();
         for &obstacle in &ids[1..] {
             world.watch(ids[0], obstacle);
         }
@@ -424,13 +432,7 @@ impl Coastal {
         let opening = Opening::draw(&self.config, &traffic.starts, traffic.dt_s, state_of, &mut rng);
         // Starts of every scenario asked for were there when the traffic was loaded.
         let opening = opening.expect("a start of each scenario that is asked for");
-        let kinematic = KinematicConfig { max_turn_deg: self.config.head_on.turn_per_decision_deg };
-        let own = Kinematic::new(
-            kinematic,
-            opening.own_position,
-            opening.own_heading,
-            self.config.head_on.own_speed_mps,
-        );
+        let own = self.config.head_on.launch_own(opening.own_position, opening.own_heading);
         let steps = self.config.decisions * self.steps_per_decision();
         let vessels = 2 + self.config.linear_obstacles;
         let noise = SensorNoise::draw(seed, vessels, self.config.history_positions, steps);
@@ -456,6 +458,19 @@ impl Coastal {
             episode.outcome.closest_m = episode.outcome.closest_m.min(report.min_centre_distance_m);
         }
         self.keep_step(episode, step);
+    }
+}
+
+/// Own ship's shapes: a ship with dynamics of its own has their hull.
+fn own_body(config: &CoastalConfig, body: &VesselBody) -> Result<VesselBody, CoastalError> {
+    let head_on = &config.head_on;
+    match head_on.dynamics {
+        Dynamics::Kinematic => Ok(body.clone()),
+        Dynamics::Kvlcc2 => {
+            head_on.check_dynamics()?;
+            let ship = head_on.kvlcc2.ship();
+            Ok(VesselBody { hull: Hull::new(ship.length_m, ship.beam_m, Bow::Full)?, ..body.clone() })
+        }
     }
 }
 

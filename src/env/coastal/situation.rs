@@ -3,7 +3,6 @@
 use super::{Coastal, Episode};
 use crate::geo::Position;
 use crate::policy::{OwnShip, Policy, Route, Situation, TargetShip};
-use crate::vessel::Steered;
 
 impl Coastal {
     /// The action with which `policy` answers the present situation: its turn over the greatest one.

@@ -6,6 +6,7 @@ use crate::forecast::LinearForecaster;
 use crate::geo::{Displacement, Velocity};
 use crate::policy::{Policy, Situation};
 use crate::track::VesselParticulars;
+use crate::vessel::Kvlcc2Config;
 
 /// A vessel at 10 m/s towards north for `straight_s`, then turning to port for a while.
 fn track(mmsi: u32, straight_s: f64, total_s: f64) -> Track {
@@ -108,6 +109,73 @@ fn own_ship_moves_as_computed_by_hand() {
     // The target ship has sailed for 20 s at 10 m/s as well; both were 240 s from collision.
     let apart_m = env.states()[1].position.distance_m(after.position);
     assert!((apart_m - (220.0 * 18.0)).abs() < 10.0, "{apart_m}");
+}
+
+/// The recorded ships turn and go straight for the default own ship; with dynamics the starts are judged
+/// by what that ship can do.
+fn coaster() -> CoastalConfig {
+    let kvlcc2 = Kvlcc2Config { length_m: 100.0, service_speed_mps: Some(8.0), ..Kvlcc2Config::default() };
+    let mut config = CoastalConfig {
+        linear_obstacles: 0,
+        start_position_sd_m: 0.0,
+        start_heading_port_deg: 0.0,
+        ..CoastalConfig::default()
+    };
+    config.head_on.dynamics = Dynamics::Kvlcc2;
+    config.head_on.kvlcc2 = kvlcc2;
+    config
+}
+
+#[test]
+fn an_agent_with_dynamics_meets_what_each_scenario_promises() {
+    for (scenario, colliding, clear) in
+        [(ScenarioChoice::StraightOn, 0.0, 1.0), (ScenarioChoice::BeforeCurve, 1.0, 0.0)]
+    {
+        let mut env = env(CoastalConfig { scenario, ..coaster() }, false);
+        for seed in 0..5 {
+            episode(&mut env, seed, colliding);
+            assert!(env.outcome().unwrap().contact, "{scenario:?}, seed {seed}");
+            episode(&mut env, seed, clear);
+            let outcome = env.outcome().unwrap();
+            assert!(!outcome.contact && outcome.closest_m >= 350.0 - 1e-3, "{scenario:?}, seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn the_agents_body_is_the_ship_and_follows_its_dynamics() {
+    let config = CoastalConfig { scenario: ScenarioChoice::StraightOn, ..coaster() };
+    let launch = config.head_on.clone();
+    let mut env = env(config, false);
+    let mut observation = vec![0.0; env.observation_len()];
+    env.reset(2, &mut observation);
+    let start = env.states()[0];
+    let hull = &env.world.body(VesselId(0)).hull;
+    assert_eq!((hull.length_m(), hull.beam_m()), (100.0, 18.125));
+    let mut ship = launch.launch_own(start.position, start.heading);
+    let mut drift_deg = 0.0_f64;
+    for _ in 0..15 {
+        env.step(&[1.0], &mut observation).unwrap();
+        ship.order(Command { turn_rad: 2.4_f64.to_radians(), speed_mps: None });
+        for _ in 0..4 {
+            ship.advance(5.0);
+        }
+        let (state, body) = (env.states()[0], *env.world.state(VesselId(0)));
+        assert_eq!(state, body);
+        assert!(state.position.distance_m(ship.state().position) < 1e-6);
+        drift_deg = drift_deg.max(state.heading.turn_from(state.velocity.course()).to_degrees());
+    }
+    let turned_deg = env.states()[0].heading.turn_from(start.heading).to_degrees();
+    assert!((30.0..37.0).contains(&turned_deg), "{turned_deg}");
+    assert!(drift_deg > 0.5, "{drift_deg}");
+}
+
+#[test]
+fn an_engine_too_weak_for_the_agents_speed_is_named() {
+    let mut config = coaster();
+    config.head_on.kvlcc2.service_speed_mps = None;
+    let error = RecordedTraffic::new(vec![track(1, 9000.0, 3000.0)], &config).unwrap_err();
+    assert!(error.to_string().starts_with("head_on.kvlcc2.service_speed_mps: the engine"), "{error}");
 }
 
 #[test]
