@@ -8,6 +8,7 @@ struct Leg {
     begin: Position,
     course: Nautical,
     length_m: f64,
+    speed_mps: Option<f64>,
 }
 
 /// A planned path.
@@ -20,21 +21,41 @@ impl Route {
     /// One straight line through `begin`.
     #[must_use]
     pub fn straight(begin: Position, course: Nautical) -> Self {
-        Self { legs: vec![Leg { begin, course, length_m: f64::INFINITY }] }
+        Self { legs: vec![Leg { begin, course, length_m: f64::INFINITY, speed_mps: None }] }
     }
 
     /// From waypoint to waypoint; beyond the last one the last course goes on. Nothing where fewer
     /// than two waypoints lie apart from each other.
     #[must_use]
     pub fn through(waypoints: &[Position]) -> Option<Self> {
-        let mut legs: Vec<_> = waypoints
-            .windows(2)
-            .map(|ends| (ends[0], ends[1] - ends[0]))
-            .filter(|(_, way)| way.length_m() > 0.0)
-            .map(|(begin, way)| Leg { begin, course: way.bearing(), length_m: way.length_m() })
-            .collect();
+        let unhurried: Vec<_> = waypoints.iter().map(|position| (*position, None)).collect();
+        Self::planned(&unhurried)
+    }
+
+    /// As [`Self::through`], with the speed that is planned from a waypoint on, in metres per second;
+    /// as on the leg before where it is not given.
+    #[must_use]
+    pub fn planned(waypoints: &[(Position, Option<f64>)]) -> Option<Self> {
+        let mut planned_mps = None;
+        let mut legs = Vec::with_capacity(waypoints.len());
+        for ends in waypoints.windows(2) {
+            let [(begin, speed_mps), (end, _)] = [ends[0], ends[1]];
+            planned_mps = speed_mps.or(planned_mps);
+            let way = end - begin;
+            let length_m = way.length_m();
+            if length_m > 0.0 {
+                legs.push(Leg { begin, course: way.bearing(), length_m, speed_mps: planned_mps });
+            }
+        }
         legs.last_mut()?.length_m = f64::INFINITY;
         Some(Self { legs })
+    }
+
+    /// The speed that is planned where the route is nearest to a position, in metres per second; nothing
+    /// where none is.
+    #[must_use]
+    pub fn speed_mps(&self, position: Position) -> Option<f64> {
+        self.legs[self.nearest(position).0].speed_mps
     }
 
     /// Cross-track error of a position, in metres: its distance from the route, positive to **port**.
@@ -106,6 +127,15 @@ mod tests {
         assert_eq!(route.course(at(1100.0, 500.0)).degrees().round(), 90.0);
         assert!((route.cross_track_error_m(at(1100.0, 500.0)) - 100.0).abs() < 1e-9);
         assert!((route.course_back(at(1000.0, 5000.0), 200.0).degrees() - 90.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_planned_speed_holds_until_the_next() {
+        let waypoints = [(0.0, None), (1000.0, Some(4.0)), (2000.0, None), (3000.0, Some(9.0))];
+        let waypoints = waypoints.map(|(north_m, speed_mps)| (at(north_m, 0.0), speed_mps));
+        let route = Route::planned(&waypoints).expect("a route");
+        let planned = [500.0, 1500.0, 2500.0, 9000.0].map(|north_m| route.speed_mps(at(north_m, 10.0)));
+        assert_eq!(planned, [None, Some(4.0), Some(4.0), Some(4.0)]);
     }
 
     #[test]

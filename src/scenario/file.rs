@@ -321,7 +321,7 @@ time = 2020-12-03T04:05:06Z
             (
                 "time = 2020-12-03T04:05:06Z",
                 "time = 2020-12-03T04:05:06Z\nspeed_kn = 5",
-                "29: key \"target[2].speed_kn\": is not a known key: the keys known here are name, length_m, beam_m, bow, collision_radius_m, motion, ais_file, area_file, track_dir, mmsi, start, time",
+                "29: key \"target[2].speed_kn\": is not a known key: the keys known here are name, dynamics, kvlcc2, pilot, length_m, beam_m, bow, collision_radius_m, motion, ais_file, area_file, track_dir, mmsi, start, time",
             ),
         ];
         for (replaced, with, expected) in mistakes {

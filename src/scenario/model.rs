@@ -11,7 +11,10 @@ use super::placement::{Bearing, WantedCpa};
 use crate::angle::Nautical;
 use crate::geo::{Geodetic, LocalPlane, MPS_PER_KNOT, Position};
 use crate::track::Track;
-use crate::vessel::{PeriodicConfig, StochasticConfig};
+use crate::vessel::mmg::{MmgParameters, Surroundings};
+use crate::vessel::{
+    Dynamics, DynamicsConfig, KinematicConfig, PeriodicConfig, PilotConfig, StochasticConfig,
+};
 use crate::world::Bow;
 
 /// A scripted encounter: own ship, the target ships it meets, and how it is observed and steered.
@@ -36,6 +39,8 @@ pub struct Scenario {
     pub seed: u64,
     /// Noise of the position sensors.
     pub sensor_noise: SensorNoise,
+    /// Current and wind, for the ships whose dynamics feel them.
+    pub surroundings: Surroundings,
     /// Name of the policy that steers own ship, one of [`crate::policy::NAMES`].
     pub policy: String,
     /// Radius of the collision circle of every ship that has none of its own, in metres. Two ships
@@ -62,11 +67,19 @@ pub struct Limits {
     pub steps_max: usize,
     /// Least time step, in seconds.
     pub dt_min_s: f64,
+    /// Greatest number of integration steps of a ship with dynamics.
+    pub substeps_max: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { speed_max_mps: 35.0, extent_max_m: 200_000.0, steps_max: 100_000, dt_min_s: 0.05 }
+        Self {
+            speed_max_mps: 35.0,
+            extent_max_m: 200_000.0,
+            steps_max: 100_000,
+            dt_min_s: 0.05,
+            substeps_max: 2e7,
+        }
     }
 }
 
@@ -115,6 +128,21 @@ pub struct ShipSize {
     pub bow: Bow,
 }
 
+impl ShipSize {
+    /// The proportions of KVLCC2.
+    #[must_use]
+    pub fn kvlcc2(length_m: f64) -> Self {
+        let beam_m = MmgParameters::default().scaled_to(length_m).beam_m;
+        Self { length_m, beam_m, bow: Bow::Full }
+    }
+
+    /// KVLCC2 as it would be built.
+    #[must_use]
+    pub fn full_size_kvlcc2() -> Self {
+        Self::kvlcc2(MmgParameters::default().length_m)
+    }
+}
+
 impl Default for ShipSize {
     /// A small coaster.
     fn default() -> Self {
@@ -122,7 +150,8 @@ impl Default for ShipSize {
     }
 }
 
-/// How own ship answers its policy: the kinematic agent of the paper's coastal environment.
+/// How often own ship asks its policy, and how much each answer changes. The default is that of the
+/// paper's coastal environment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Steering {
@@ -135,6 +164,24 @@ pub struct Steering {
 impl Default for Steering {
     fn default() -> Self {
         Self { max_turn_deg: 2.4, decision_interval_s: 20.0 }
+    }
+}
+
+impl Steering {
+    /// What suits a kind of dynamics.
+    #[must_use]
+    pub fn suiting(dynamics: Dynamics) -> Self {
+        match dynamics {
+            Dynamics::Kinematic => Self::default(),
+            // An order of this size is one that the ship can follow in the time.
+            Dynamics::Kvlcc2 => Self { max_turn_deg: 10.0, ..Self::default() },
+        }
+    }
+
+    /// What one decision changes at most.
+    #[must_use]
+    pub fn limits(&self) -> KinematicConfig {
+        KinematicConfig { max_turn_deg: self.max_turn_deg }
     }
 }
 
@@ -153,9 +200,20 @@ pub struct OwnShip {
     pub start: OwnStart,
     /// Waypoints after the start that it wants to reach; where there are none, it wants to keep its
     /// course.
-    pub route: Vec<Point>,
+    pub route: Vec<RoutePoint>,
     /// How it answers its policy.
     pub steering: Steering,
+    /// How it moves. A ship of KVLCC2's form has the length of `size`.
+    pub dynamics: DynamicsConfig,
+}
+
+/// A waypoint of own ship's route.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoutePoint {
+    /// Where it is.
+    pub point: Point,
+    /// The speed planned from there on, in metres per second; as before where not given.
+    pub speed_mps: Option<f64>,
 }
 
 /// Where own ship starts and on which course.
@@ -202,6 +260,7 @@ impl OwnShip {
             start,
             route: Vec::new(),
             steering: Steering::default(),
+            dynamics: DynamicsConfig::default(),
         }
     }
 
@@ -217,7 +276,8 @@ impl OwnShip {
     /// Sets the waypoints that it wants to reach.
     #[must_use]
     pub fn route(self, route: &[Point]) -> Self {
-        Self { route: route.to_vec(), ..self }
+        let route = route.iter().map(|&point| RoutePoint { point, speed_mps: None }).collect();
+        Self { route, ..self }
     }
 
     /// Sets the speed, in metres per second.
@@ -237,6 +297,17 @@ impl OwnShip {
     pub fn size(self, length_m: f64, beam_m: f64) -> Self {
         Self { size: ShipSize { length_m, beam_m, ..self.size }, ..self }
     }
+
+    /// Gives it the form and the dynamics of KVLCC2 at a length, in metres.
+    #[must_use]
+    pub fn kvlcc2(self, length_m: f64) -> Self {
+        Self {
+            size: ShipSize::kvlcc2(length_m),
+            steering: Steering::suiting(Dynamics::Kvlcc2),
+            dynamics: DynamicsConfig { dynamics: Dynamics::Kvlcc2, ..self.dynamics },
+            ..self
+        }
+    }
 }
 
 /// A ship that own ship meets.
@@ -248,8 +319,38 @@ pub struct Target {
     pub size: Option<ShipSize>,
     /// Radius of its collision circle, in metres, where it differs from the scenario's.
     pub collision_radius_m: Option<f64>,
-    /// How it moves.
+    /// How it moves, or where its pilot takes it.
     pub motion: TargetMotion,
+    /// Its dynamics. Kinematic ships do what `motion` says to the letter; a ship of KVLCC2's form, with the
+    /// length of `size`, is piloted along its course or its waypoints.
+    pub dynamics: DynamicsConfig,
+    /// How it is piloted, where it is.
+    pub pilot: PilotConfig,
+}
+
+impl Target {
+    /// A target of default or recorded size that does what `motion` says to the letter.
+    #[must_use]
+    pub fn new(name: &str, motion: TargetMotion) -> Self {
+        Self {
+            name: name.to_owned(),
+            size: None,
+            collision_radius_m: None,
+            motion,
+            dynamics: DynamicsConfig::default(),
+            pilot: PilotConfig::default(),
+        }
+    }
+
+    /// Gives it the form and the dynamics of KVLCC2 at a length, in metres.
+    #[must_use]
+    pub fn kvlcc2(self, length_m: f64) -> Self {
+        Self {
+            size: Some(ShipSize::kvlcc2(length_m)),
+            dynamics: DynamicsConfig { dynamics: Dynamics::Kvlcc2, ..self.dynamics },
+            ..self
+        }
+    }
 }
 
 /// How a target ship moves.
@@ -408,6 +509,7 @@ impl Scenario {
             dt_s: 5.0,
             seed: 0,
             sensor_noise: SensorNoise::default(),
+            surroundings: Surroundings::default(),
             policy: "hold-course".to_owned(),
             collision_radius_m: 150.0,
             own_ship,
@@ -419,7 +521,7 @@ impl Scenario {
     /// Adds a target of default or recorded size.
     #[must_use]
     pub fn target(self, name: &str, motion: TargetMotion) -> Self {
-        self.with_target(Target { name: name.to_owned(), size: None, collision_radius_m: None, motion })
+        self.with_target(Target::new(name, motion))
     }
 
     /// Adds a target.
@@ -445,6 +547,12 @@ impl Scenario {
     #[must_use]
     pub fn sensor_noise_m(self, sigma_m: f64) -> Self {
         Self { sensor_noise: SensorNoise { sigma_m }, ..self }
+    }
+
+    /// Sets current and wind.
+    #[must_use]
+    pub fn surroundings(self, surroundings: Surroundings) -> Self {
+        Self { surroundings, ..self }
     }
 
     /// Sets the policy by its name.

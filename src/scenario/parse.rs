@@ -3,10 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use super::dynamics;
 use super::encounter_starts::HeadOnKind;
 use super::model::{
     Limits, OwnShip, OwnStart, Placement, PlannedWaypoint, Point, RecordedStart, RecordedVessel,
-    RelativePlacement, Scenario, SensorNoise, ShipSize, Steering, Target, TargetMotion, TrackSource,
+    RelativePlacement, RoutePoint, Scenario, SensorNoise, ShipSize, Steering, Target, TargetMotion,
+    TrackSource,
 };
 use super::moment;
 use super::placement::{Bearing, Passes, WantedCpa};
@@ -14,10 +16,10 @@ use super::section::{Fault, Quantity, Section, Takes};
 use crate::angle::Nautical;
 use crate::geo::{Geodetic, Position};
 use crate::policy;
-use crate::vessel::{PeriodicConfig, StochasticConfig};
+use crate::vessel::{Dynamics, PeriodicConfig, StochasticConfig};
 use crate::world::Bow;
 
-const SPEED: Quantity = Quantity::speed("speed");
+pub(super) const SPEED: Quantity = Quantity::speed("speed");
 const RANGE: Quantity = Quantity::length("range");
 const DCPA: Quantity = Quantity::length("dcpa");
 const TCPA: Quantity = Quantity::time("tcpa");
@@ -26,7 +28,7 @@ const TIME_TO_COLLISION: Quantity = Quantity::time("time_to_collision");
 const POINT_KEYS: [&str; 4] = ["north_m", "east_m", "latitude_deg", "longitude_deg"];
 const BEARING_KEYS: [&str; 2] = ["bearing_deg", "relative_bearing_deg"];
 const SPREAD: Takes = Takes::Between(0.0, 10_000.0);
-const FULL_TURN: Takes = Takes::Between(-360.0, 360.0);
+pub(super) const FULL_TURN: Takes = Takes::Between(-360.0, 360.0);
 
 /// Reads the whole document; relative paths in it start from `directory`.
 pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Result<Scenario, Fault> {
@@ -41,6 +43,7 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
     let collision_radius_m = collision_radius(&mut root)?;
     let origin = root.section("origin")?.map(geodetic_section).transpose()?;
     let sensor_noise = root.section("sensor_noise")?.map(sensor_noise).transpose()?;
+    let surroundings = dynamics::surroundings(&mut root, limits)?;
     let own_section = root.section("own_ship")?.ok_or_else(|| root.missing(&["own_ship".to_owned()]))?;
     let own_ship = own_ship(own_section, limits)?;
     let targets = targets(root.sections("target")?, directory, limits)?;
@@ -55,6 +58,7 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
         dt_s: dt_s.unwrap_or(blank.dt_s),
         seed: seed.unwrap_or(blank.seed),
         sensor_noise: sensor_noise.unwrap_or_default(),
+        surroundings,
         policy: policy.map_or(blank.policy.clone(), str::to_owned),
         collision_radius_m: collision_radius_m.unwrap_or(blank.collision_radius_m),
         targets,
@@ -84,11 +88,16 @@ fn sensor_noise(mut section: Section<'_>) -> Result<SensorNoise, Fault> {
 
 fn own_ship(mut section: Section<'_>, limits: Limits) -> Result<OwnShip, Fault> {
     let name = section.text("name")?;
-    let size = ship_size(&mut section)?;
+    let dynamics = dynamics::dynamics(&mut section)?;
+    let size = ship_size(&mut section, dynamics.dynamics)?;
     let collision_radius_m = collision_radius(&mut section)?;
     let speed_mps = speed(&mut section, limits)?;
-    let steering = section.section("steering")?.map(steering).transpose()?;
-    let route = section.sections("route")?.into_iter().map(route_point).collect::<Result<Vec<_>, Fault>>()?;
+    let steering = match section.section("steering")? {
+        Some(written) => steering(written, Steering::suiting(dynamics.dynamics))?,
+        None => Steering::suiting(dynamics.dynamics),
+    };
+    let route = section.sections("route")?.into_iter();
+    let route = route.map(|section| route_point(section, limits)).collect::<Result<Vec<_>, Fault>>()?;
     let start = match section.section("head_on")? {
         Some(mut head_on) => {
             let start = OwnStart::HeadOn {
@@ -112,18 +121,19 @@ fn own_ship(mut section: Section<'_>, limits: Limits) -> Result<OwnShip, Fault> 
         speed_mps,
         start,
         route,
-        steering: steering.unwrap_or_default(),
+        steering,
+        dynamics,
     })
 }
 
-fn route_point(mut section: Section<'_>) -> Result<Point, Fault> {
+fn route_point(mut section: Section<'_>, limits: Limits) -> Result<RoutePoint, Fault> {
     let point = point(&mut section)?;
+    let speed_mps = if section.has(&SPEED) { Some(speed(&mut section, limits)?) } else { None };
     section.finish()?;
-    Ok(point)
+    Ok(RoutePoint { point, speed_mps })
 }
 
-fn steering(mut section: Section<'_>) -> Result<Steering, Fault> {
-    let default = Steering::default();
+fn steering(mut section: Section<'_>, default: Steering) -> Result<Steering, Fault> {
     let steering = Steering {
         max_turn_deg: section
             .number("max_turn_deg", Takes::Between(0.0, 180.0))?
@@ -136,15 +146,24 @@ fn steering(mut section: Section<'_>) -> Result<Steering, Fault> {
     Ok(steering)
 }
 
-fn ship_size(section: &mut Section<'_>) -> Result<Option<ShipSize>, Fault> {
+/// Length, beam and bow. A ship of KVLCC2's form has its proportions where they are not written.
+fn ship_size(section: &mut Section<'_>, dynamics: Dynamics) -> Result<Option<ShipSize>, Fault> {
     let length = section.number("length_m", Takes::Between(1.0, 600.0))?;
     let beam = section.number("beam_m", Takes::Between(0.5, 120.0))?;
     let bows = [("fine", Bow::Fine), ("normal", Bow::Normal), ("full", Bow::Full)];
     let bow = section.choice("bow", &bows)?;
+    let default = match dynamics {
+        Dynamics::Kinematic => None,
+        Dynamics::Kvlcc2 => Some(length.map_or_else(ShipSize::full_size_kvlcc2, ShipSize::kvlcc2)),
+    };
     match (length, beam) {
+        (_, None) if default.is_some() => {
+            Ok(default.map(|size| ShipSize { bow: bow.unwrap_or(size.bow), ..size }))
+        }
         (None, None) if bow.is_none() => Ok(None),
         (Some(length_m), Some(beam_m)) if beam_m <= length_m => {
-            Ok(Some(ShipSize { length_m, beam_m, bow: bow.unwrap_or_default() }))
+            let bow = bow.or(default.map(|size| size.bow)).unwrap_or_default();
+            Ok(Some(ShipSize { length_m, beam_m, bow }))
         }
         (Some(length_m), Some(beam_m)) => Err(section.fault(
             "beam_m",
@@ -172,11 +191,13 @@ fn targets(sections: Vec<Section<'_>>, directory: &Path, limits: Limits) -> Resu
                 "give each its own name",
             ));
         }
-        let size = ship_size(&mut section)?;
+        let dynamics = dynamics::dynamics(&mut section)?;
+        let pilot = dynamics::pilot(&mut section, dynamics.dynamics)?;
+        let size = ship_size(&mut section, dynamics.dynamics)?;
         let collision_radius_m = collision_radius(&mut section)?;
         let motion = target_motion(&mut section, directory, limits)?;
         section.finish()?;
-        targets.push(Target { name, size, collision_radius_m, motion });
+        targets.push(Target { name, size, collision_radius_m, motion, dynamics, pilot });
     }
     Ok(targets)
 }
@@ -446,7 +467,7 @@ fn course(section: &mut Section<'_>) -> Result<Nautical, Fault> {
     section.required_number("course_deg", FULL_TURN).map(Nautical::from_degrees)
 }
 
-fn speed(section: &mut Section<'_>, limits: Limits) -> Result<f64, Fault> {
+pub(super) fn speed(section: &mut Section<'_>, limits: Limits) -> Result<f64, Fault> {
     section.required_quantity(&SPEED, Takes::NotNegative).and_then(|speed_mps| {
         if speed_mps <= limits.speed_max_mps {
             return Ok(speed_mps);

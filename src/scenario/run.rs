@@ -6,7 +6,7 @@ use super::streams::PositionSensor;
 use crate::episode::{Episode, PairStep, Step, VesselInfo, VesselRole, VesselStep};
 use crate::geo::Position;
 use crate::policy::{self, HoldCourse, OwnShip, Policy, Situation, TargetShip};
-use crate::vessel::{Kinematic, KinematicConfig, Linear, Motion, Steered, VesselState};
+use crate::vessel::{Command, Linear, Motion, Steered, VesselState};
 use crate::world::{VesselId, World, WorldConfig};
 
 impl StagedEncounter {
@@ -50,7 +50,9 @@ impl StagedEncounter {
     }
 
     fn episode(&self, policy: &str, steps: Vec<Step>) -> Episode {
-        let own = VesselInfo::new(&self.scenario.own_ship.name, VesselRole::Own, "kinematic", &self.own_body);
+        let own_ship = &self.scenario.own_ship;
+        let word = own_ship.dynamics.dynamics.word();
+        let own = VesselInfo::new(&own_ship.name, VesselRole::Own, word, &self.own_body);
         let targets = self.targets.iter().map(|target| {
             VesselInfo::new(&target.name, VesselRole::Target, target.motion_word, &target.body)
         });
@@ -70,7 +72,7 @@ impl StagedEncounter {
 /// An encounter under way. Own ship is vessel 0, the targets follow.
 struct Voyage<'s> {
     staged: &'s StagedEncounter,
-    own: Kinematic,
+    own: Box<dyn Steered>,
     world: World,
     step: i64,
     /// Where each vessel truly is.
@@ -83,12 +85,7 @@ struct Voyage<'s> {
 impl<'s> Voyage<'s> {
     fn new(staged: &'s StagedEncounter) -> Self {
         let scenario = &staged.scenario;
-        let own = Kinematic::new(
-            KinematicConfig { max_turn_deg: scenario.own_ship.steering.max_turn_deg },
-            staged.own_start.position,
-            staged.own_start.heading,
-            scenario.own_ship.speed_mps,
-        );
+        let own = scenario.launch_own(staged.own_start.position, staged.own_start.velocity);
         let targets = || staged.targets.iter();
         let states: Vec<_> =
             std::iter::once(own.state()).chain(targets().map(|target| target.motion.state(0))).collect();
@@ -139,7 +136,9 @@ impl<'s> Voyage<'s> {
             route: &self.staged.route,
             targets: &targets,
         });
-        self.own.order(command);
+        // A policy that leaves the speed alone leaves it to the plan.
+        let planned_mps = self.staged.route.speed_mps(self.states[0].position);
+        self.own.order(Command { speed_mps: command.speed_mps.or(planned_mps), ..command });
     }
 
     /// Where its sensor places a vessel now.
@@ -194,7 +193,6 @@ mod tests {
     use super::*;
     use crate::angle::Nautical;
     use crate::scenario::{OwnShip as Own, Placement, Point, TargetMotion};
-    use crate::vessel::Command;
 
     fn head_on() -> Scenario {
         let south = Placement::At {
@@ -276,6 +274,16 @@ mod tests {
     fn without_noise_nothing_is_said_of_sensors() {
         let episode = head_on().set_up().unwrap().run();
         assert!(episode.steps.iter().flat_map(|step| &step.vessels).all(|vessel| vessel.observed.is_none()));
+    }
+
+    #[test]
+    fn each_leg_of_the_route_is_sailed_at_its_speed() {
+        let mut own =
+            Own::heading(0.0).speed_mps(8.0).route(&[Point::local(800.0, 0.0), Point::local(5e3, 0.0)]);
+        own.route[0].speed_mps = Some(5.0);
+        let episode = Scenario::new("legs", own).set_up().unwrap().run();
+        let speeds_mps = [10, 19, 30, 60].map(|step| episode.steps[step].vessels[0].velocity.speed_mps());
+        assert_eq!(speeds_mps.map(f64::round), [8.0, 8.0, 5.0, 5.0]);
     }
 
     #[test]

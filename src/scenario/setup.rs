@@ -14,7 +14,7 @@ use crate::config::ConfigError;
 use crate::geo::{LocalPlane, Position, Velocity};
 use crate::policy::{self, Route};
 use crate::track::Track;
-use crate::vessel::{self, Linear, Motion, Recorded, VesselState, Waypoint, Waypoints};
+use crate::vessel::{self, Dynamics, Linear, Motion, Recorded, VesselState, Waypoint, Waypoints};
 use crate::world::{Hull, VesselBody};
 
 /// A scenario whose ships are placed: ready to run, as often as wanted.
@@ -83,6 +83,7 @@ impl Scenario {
                 format!("write one of {}", policy::NAMES.join(", ")),
             ));
         }
+        self.check_dynamics()?;
         let mut library = TrackLibrary::default();
         let frame = Frame { plane: self.plane(&mut library)? };
         let anchors = self
@@ -95,6 +96,7 @@ impl Scenario {
             .collect::<Result<Vec<_>, Fault>>()?;
         let route = self.own_route(&frame)?;
         let own = self.place_own(&frame, &route, &anchors)?;
+        self.check_own_speed(own.velocity)?;
         self.check_extent(own.position, "own_ship")?;
         let targets = self
             .targets
@@ -110,10 +112,9 @@ impl Scenario {
         let own_body = self
             .body(own_ship.size, own_ship.collision_radius_m)
             .map_err(|fault| fault.within("own_ship"))?;
-        let own_start =
-            VesselState { position: own.position, velocity: own.velocity, heading: own.velocity.course() };
-        let ends: Vec<Position> = std::iter::once(own.position).chain(route).collect();
-        let route = Route::through(&ends).unwrap_or(Route::straight(own.position, own_start.heading));
+        let own_start = self.launch_own(own.position, own.velocity).state();
+        let route = std::iter::once((own.position, None)).chain(route).collect::<Vec<_>>();
+        let route = Route::planned(&route).unwrap_or(Route::straight(own.position, own.velocity.course()));
         Ok(StagedEncounter {
             scenario: self.clone(),
             plane: frame.plane,
@@ -217,7 +218,7 @@ impl Scenario {
                     })
                     .collect::<Result<Vec<_>, Fault>>()?;
                 Waypoints::new(&waypoints, self.dt_s)
-                    .map(Anchor::Route)
+                    .map(|motion| Anchor::Route { motion, waypoints })
                     .map_err(|error| Fault::new("waypoints", error.to_string(), "see the list"))
             }
             TargetMotion::Linear(placement)
@@ -243,6 +244,8 @@ impl Scenario {
             own_speed_mps: self.own_ship.speed_mps,
             time_to_collision_s,
             turn_per_decision_deg: self.own_ship.steering.max_turn_deg,
+            dynamics: self.own_ship.dynamics.dynamics,
+            kvlcc2: self.own_dynamics().kvlcc2,
             decision_interval_s: self.own_ship.steering.decision_interval_s,
             history_s: self.history_s,
             future_s: self.duration_s,
@@ -250,25 +253,31 @@ impl Scenario {
         }
     }
 
-    fn own_route(&self, frame: &Frame) -> Result<Vec<Position>, Fault> {
+    /// Own ship's waypoints with the speed that is planned from each on.
+    fn own_route(&self, frame: &Frame) -> Result<Vec<(Position, Option<f64>)>, Fault> {
         let waypoints = self.own_ship.route.iter().enumerate();
         waypoints
-            .map(|(index, point)| {
+            .map(|(index, waypoint)| {
                 let place = format!("own_ship.route[{}]", index + 1);
-                let position = frame.position(*point).map_err(|fault| fault.within(&place))?;
-                self.check_extent(position, &place).map(|()| position)
+                let position = frame.position(waypoint.point).map_err(|fault| fault.within(&place))?;
+                self.check_extent(position, &place).map(|()| (position, waypoint.speed_mps))
             })
             .collect()
     }
 
-    fn place_own(&self, frame: &Frame, route: &[Position], anchors: &[Anchor]) -> Result<Kinematics, Fault> {
+    fn place_own(
+        &self,
+        frame: &Frame,
+        route: &[(Position, Option<f64>)],
+        anchors: &[Anchor],
+    ) -> Result<Kinematics, Fault> {
         let speed_mps = self.own_ship.speed_mps;
         match &self.own_ship.start {
             OwnStart::At { point, course } => {
                 let position = frame.position(*point).map_err(|fault| fault.within("own_ship"))?;
                 let course = match (course, route.first()) {
                     (Some(course), _) => *course,
-                    (None, Some(waypoint)) => (*waypoint - position).bearing(),
+                    (None, Some((waypoint, _))) => (*waypoint - position).bearing(),
                     (None, None) => {
                         return Err(Fault::new(
                             "own_ship.course_deg",
@@ -341,18 +350,26 @@ impl Scenario {
         own: Kinematics,
         steps: usize,
     ) -> Result<PlacedTarget, Fault> {
-        let (motion, mmsi, recorded_size): (Arc<dyn Motion>, _, _) = match anchor {
-            Anchor::Replay { motion, track } => (Arc::new(motion), Some(track.mmsi), recorded_size(&track)),
-            Anchor::Route(route) => (Arc::new(route), None, None),
-            Anchor::Free(start) => (self.straight_motion(index, target, start, steps)?, None, None),
-            Anchor::FromOwnShip(placement) => {
-                let start = self.relative_to(own, placement)?;
-                (self.straight_motion(index, target, start, steps)?, None, None)
-            }
+        let recorded_size = match &anchor {
+            Anchor::Replay { track, .. } => recorded_size(track),
+            _ => None,
         };
         let size = target.size.or(recorded_size).unwrap_or_default();
         let body = self.body(size, target.collision_radius_m)?;
-        let motion_word = target.motion.word();
+        let is_piloted = target.dynamics.dynamics != Dynamics::Kinematic;
+        let (motion, mmsi): (Arc<dyn Motion>, _) = match anchor {
+            Anchor::Replay { motion, track } => (Arc::new(motion), Some(track.mmsi)),
+            Anchor::Route { waypoints, .. } if is_piloted => {
+                (Arc::new(self.piloted(target, waypoints, size, steps)?), None)
+            }
+            Anchor::Route { motion, .. } => (Arc::new(motion), None),
+            Anchor::Free(start) => (self.straight_motion(index, target, start, size, steps)?, None),
+            Anchor::FromOwnShip(placement) => {
+                let start = self.relative_to(own, placement)?;
+                (self.straight_motion(index, target, start, size, steps)?, None)
+            }
+        };
+        let motion_word = if is_piloted { target.dynamics.dynamics.word() } else { target.motion.word() };
         Ok(PlacedTarget { name: target.name.clone(), body, motion_word, mmsi, motion })
     }
 
@@ -383,9 +400,13 @@ impl Scenario {
         index: usize,
         target: &Target,
         start: Kinematics,
+        size: ShipSize,
         steps: usize,
     ) -> Result<Arc<dyn Motion>, Fault> {
         self.check_extent(start.position, "")?;
+        if target.dynamics.dynamics != Dynamics::Kinematic {
+            return Ok(Arc::new(self.piloted_straight(target, start, size, steps)?));
+        }
         let linear = Linear::new(start.position, start.velocity, self.dt_s);
         let history = (self.history_s / self.dt_s).ceil() as usize;
         let mut rng = stream(self.seed, Purpose::Motion, index + 1);
@@ -416,7 +437,7 @@ impl Scenario {
 /// A target as far as it is known before own ship is placed.
 enum Anchor {
     Replay { motion: Recorded, track: Arc<Track> },
-    Route(Waypoints),
+    Route { motion: Waypoints, waypoints: Vec<Waypoint> },
     Free(Kinematics),
     FromOwnShip(RelativePlacement),
 }
@@ -429,7 +450,7 @@ impl Anchor {
         };
         match self {
             Self::Replay { motion, .. } => Some(of(motion)),
-            Self::Route(route) => Some(of(route)),
+            Self::Route { motion, .. } => Some(of(motion)),
             Self::Free(kinematics) => Some(*kinematics),
             Self::FromOwnShip(_) => None,
         }

@@ -72,6 +72,24 @@ fn a_stern_that_swings_out_touches() {
     assert!(contact_s > 0.5 && contact_s < 2.5, "{contact_s}");
 }
 
+/// A vessel that drifts broadside on: its hull lies as it heads, not as it goes.
+#[test]
+fn the_hull_of_a_drifting_vessel_lies_along_its_heading() {
+    let mut world = pair([state(0.0, 0.0, 0.0), state(70.0, 60.0, 0.0)]);
+    let drifting = |east_m: f64| {
+        let velocity = Velocity { north_mps: 0.0, east_mps: 8.0 };
+        VesselState { velocity, ..state(0.0, east_m, 0.0) }
+    };
+    // Beam to beam the hulls touch after 60 - 15 - 8 metres; end on they would have at once.
+    let report = world.step(&[drifting(40.0), state(70.0, 60.0, 0.0)])[0];
+    let contact_s = report.hull_contact_time_s.expect("contact of the hulls");
+    assert!((contact_s - 5.0 * 37.0 / 40.0).abs() < 1e-3, "{contact_s}");
+    // Ahead of its bow the same drift touches nothing.
+    let mut world = pair([state(0.0, 0.0, 0.0), state(140.0, 60.0, 0.0)]);
+    let report = world.step(&[drifting(120.0), state(140.0, 60.0, 0.0)])[0];
+    assert!(!report.hulls_touch() && report.min_hull_distance_m > 4.0, "{report:?}");
+}
+
 #[test]
 fn times_count_from_the_start_and_reset_sets_them_back() {
     let starts = [state(0.0, 0.0, 0.0), state(1000.0, 0.0, 180.0)];
