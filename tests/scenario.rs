@@ -181,3 +181,52 @@ fn the_example_collides_under_one_policy_and_not_under_the_other() {
     assert!(head_on::encounter("hold-course").unwrap().has_contact());
     assert!(!head_on::encounter("rule-based").unwrap().has_contact());
 }
+
+#[test]
+fn a_traffic_situation_becomes_a_scenario_and_comes_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let (toml, json, again) = (path("lightship.toml"), path("lightship.json"), path("again.toml"));
+    let run = |arguments: &[&str]| {
+        let output = searoom(arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let situation = "scenarios/exchange/off_the_lightship.json";
+    let said = run(&["scenario", "import", situation, "--out", &toml]);
+    assert!(said.contains("lightship.toml: fits") && said.contains("startTime"), "{said}");
+    let ran = outcome(&toml, &["--policy", "hold-course"]);
+    assert_eq!(ran["targets"][0]["name"], "CROSSER");
+    let said = run(&["scenario", "export", &toml, "--out", &json]);
+    assert!(said.contains("maritime-schema 0.2.0, own ship and 2 target ships"), "{said}");
+    run(&["scenario", "import", &json, "--out", &again]);
+    let closest =
+        |file: &str| outcome(file, &["--policy", "hold-course"])["targets"][0]["closest_m"].as_f64().unwrap();
+    assert!((closest(&toml) - closest(&again)).abs() < 0.1);
+
+    let nowhere = searoom(&["scenario", "export", "scenarios/overtaking.toml", "--out", &json]);
+    assert!(!nowhere.status.success());
+    let message = String::from_utf8(nowhere.stderr).unwrap();
+    assert!(message.contains("--origin-latitude-deg"), "{message}");
+    let faulty = path("faulty.json");
+    std::fs::write(&faulty, "{\n\"ownShip\": 3}").unwrap();
+    let refused = searoom(&["scenario", "import", &faulty, "--out", &again]);
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert!(message.contains("faulty.json:2: key \"ownShip\": is a number, not an object"), "{message}");
+}
+
+/// The shipped encounter of ships with dynamics: holding course ends in contact, and the bow does not point
+/// where the ship goes.
+#[test]
+fn tankers_in_a_current_are_sailed_by_their_dynamics() {
+    let mut file = ScenarioFile::load(&root("scenarios/tankers.toml")).unwrap();
+    let ruled = file.set_up().unwrap().run();
+    assert!(ruled.vessels.iter().all(|vessel| vessel.motion == "kvlcc2"));
+    let drift_deg = ruled.steps.iter().map(|step| {
+        let own = &step.vessels[0];
+        own.heading.turn_from(own.velocity.course()).to_degrees().abs()
+    });
+    assert!(drift_deg.fold(0.0, f64::max) > 3.0);
+    file.scenario.policy = "hold-course".to_owned();
+    assert!(file.set_up().unwrap().run().has_contact());
+}

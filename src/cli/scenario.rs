@@ -7,6 +7,8 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 use serde::Serialize;
 
+mod exchange;
+
 use super::policies::{self, Waters};
 use super::table::table;
 use crate::episode::{Episode, TargetSummary};
@@ -42,6 +44,17 @@ enum Command {
         searoom scenario run scenarios/head_on.toml --policy runs/coastal-lstm-sac-seed-1\n  \
         searoom scenario run scenarios/head_on_curve.toml --seed 7 --json")]
     Run(RunArgs),
+    /// Make a scenario file of a traffic situation in DNV's maritime-schema JSON
+    #[command(after_help = "What a scenario cannot hold is left out and listed.\n\nExamples:\n  \
+        searoom scenario import situation.json --out situation.toml\n  \
+        searoom scenario import situation.json --out situation.toml --dynamics kvlcc2")]
+    Import(exchange::ImportArgs),
+    /// Write a scenario as a traffic situation in DNV's maritime-schema JSON
+    #[command(after_help = "Examples:\n  \
+        searoom scenario export scenarios/fairway.toml --out fairway.json\n  \
+        searoom scenario export scenarios/tankers.toml --out tankers.json \\\n    \
+        --origin-latitude-deg 54.1 --origin-longitude-deg 7.9")]
+    Export(exchange::ExportArgs),
 }
 
 #[derive(Debug, clap::Args)]
@@ -72,6 +85,8 @@ pub fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
         Command::List { directory } => list(&directory, out),
         Command::Check { files } => check(&files, out),
         Command::Run(args) => run_scenario(&args, out),
+        Command::Import(args) => exchange::run_import(&args, out),
+        Command::Export(args) => exchange::run_export(&args, out),
     }
 }
 

@@ -9,6 +9,7 @@
 mod dynamics;
 pub mod encounter_starts;
 mod file;
+pub mod maritime_schema;
 mod model;
 mod moment;
 mod parse;
@@ -19,6 +20,7 @@ mod setup;
 pub mod starts_cache;
 pub mod streams;
 mod tracks;
+mod write;
 
 pub use file::ScenarioFile;
 pub use model::*;
