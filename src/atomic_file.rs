@@ -38,6 +38,16 @@ pub fn write_through<W: Write>(
     write_whole(path, wrap, fill).map_err(|source| WriteError { path: path.to_owned(), source })
 }
 
+/// How names of temporary files begin and end.
+const UNFINISHED: (&str, &str) = (".", ".partial");
+
+/// Whether a file is one that was never put in place: its process was killed, or is still writing.
+#[must_use]
+pub fn is_unfinished(path: &Path) -> bool {
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    name.is_some_and(|name| name.starts_with(UNFINISHED.0) && name.ends_with(UNFINISHED.1))
+}
+
 fn write_whole<W: Write>(
     path: &Path,
     wrap: impl FnOnce(File) -> W,
@@ -49,7 +59,7 @@ fn write_whole<W: Write>(
     };
     std::fs::create_dir_all(folder)?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".").suffix(".partial");
+    builder.prefix(UNFINISHED.0).suffix(UNFINISHED.1);
     // The default of `tempfile` shuts out everybody else; a result is an ordinary file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -116,6 +126,20 @@ pub(crate) mod tests {
             write(&path, |out| out.write_all(content.as_bytes())).unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
         }
+    }
+
+    #[test]
+    fn a_file_is_unfinished_until_it_is_put_in_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.json");
+        write(&path, |out| {
+            out.write_all(b"half")?;
+            let entries = std::fs::read_dir(folder.path())?.flatten();
+            assert!(entries.map(|entry| entry.path()).all(|path| is_unfinished(&path)));
+            Ok(())
+        })
+        .unwrap();
+        assert!(!is_unfinished(&path) && !is_unfinished(folder.path()));
     }
 
     #[test]

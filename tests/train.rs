@@ -103,6 +103,38 @@ fn a_killed_run_resumes_to_the_same_weights() {
     }
 }
 
+/// Before its first checkpoint a run has nothing to go on from but its configuration.
+#[test]
+fn a_run_without_a_checkpoint_begins_again() {
+    let (straight, killed) = (folder(), folder());
+    let arguments = [&TRAIN[..], &["--steps", "130"]].concat();
+    assert!(output(straight.path(), &arguments).status.success());
+    fs::create_dir(killed.path().join("run")).unwrap();
+    let [from, to] = [&straight, &killed].map(|folder| folder.path().join("run/config.toml"));
+    fs::copy(from, to).unwrap();
+    fs::write(killed.path().join("run/evaluations.csv"), "step,mean_return\n100,5.0\n").unwrap();
+    assert!(output(killed.path(), &["train", "--resume", "run"]).status.success());
+    for file in ["run/checkpoint.safetensors", "run/policy.safetensors", "run/evaluations.csv"] {
+        let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
+        assert!(ours == theirs, "{file} differs");
+    }
+}
+
+/// One process at a time trains in a folder.
+#[test]
+fn a_folder_in_use_is_refused() {
+    let folder = folder();
+    let arguments = [&TRAIN[..], &["--steps", "100000"]].concat();
+    let mut child = searoom(folder.path(), &arguments).spawn().unwrap();
+    while !folder.path().join("run/checkpoint.safetensors").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let second = output(folder.path(), &["train", "--resume", "run"]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!second.status.success() && text(&second).1.contains("another process"), "{:?}", text(&second));
+}
+
 /// With a checkpoint after every decision the process is killed while it writes one, again and again.
 #[test]
 fn a_run_killed_while_it_writes_checkpoints_loses_nothing_else() {
@@ -123,8 +155,12 @@ fn a_run_killed_while_it_writes_checkpoints_loses_nothing_else() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
+    // What such a process may leave behind goes.
+    fs::write(killed.path().join("run/.abc.partial"), "half").unwrap();
     let resumed = output(killed.path(), &["train", "--resume", "run", "--checkpoint-every", "1"]);
     assert!(resumed.status.success(), "{:?}", text(&resumed));
+    let left = fs::read_dir(killed.path().join("run")).unwrap().flatten().map(|entry| entry.file_name());
+    assert!(left.into_iter().all(|name| !name.to_string_lossy().ends_with(".partial")));
     for file in ["run/checkpoint.safetensors", "run/policy.safetensors", "run/evaluations.csv"] {
         let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
         assert!(ours == theirs, "{file} differs");

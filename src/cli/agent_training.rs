@@ -83,6 +83,7 @@ pub(super) fn train(
     watcher: &dyn Watcher,
 ) -> anyhow::Result<Ending> {
     let _lock = lock(folder)?;
+    remove_leftovers(folder)?;
     let mut trainer = Trainer::new(config.trainer.clone(), envs.make()?, compute);
     let checkpoints = if folder.join(checkpoint::FILE).exists() {
         checkpoint::load(folder, &mut trainer)?
@@ -111,6 +112,17 @@ fn lock(folder: &Path) -> anyhow::Result<File> {
         }
         Err(TryLockError::Error(error)) => Err(error).with_context(|| path.display().to_string()),
     }
+}
+
+/// Removes files that a killed process was about to put in place.
+fn remove_leftovers(folder: &Path) -> anyhow::Result<()> {
+    for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_file() && atomic_file::is_unfinished(&path) {
+            fs::remove_file(&path).with_context(|| path.display().to_string())?;
+        }
+    }
+    Ok(())
 }
 
 /// Episodes that `rollout/ep_rew_mean` is taken over, as in Stable-Baselines3.
