@@ -68,10 +68,7 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     args.pace.check()?;
     let sweep = SweepConfig::load(&args.file)?;
     let runs = sweep.runs().with_context(|| args.file.display().to_string())?;
-    let mut done = Vec::new();
-    for run in &runs {
-        done.push(step_of(run).with_context(|| run.folder.display().to_string())?);
-    }
+    let done = runs.iter().map(step_of).collect::<anyhow::Result<Vec<_>>>()?;
     if args.list {
         return list(&args, &runs, &done, out);
     }
@@ -109,8 +106,9 @@ fn step_of(run: &PlannedRun) -> anyhow::Result<u64> {
     let theirs = RunConfig { steps: run.config.steps, ..run_config(&run.folder)? };
     if let Some((key, theirs, ours)) = first_difference(&theirs, &run.config) {
         bail!(
-            "has a run of another configuration: `{key}` is {theirs} there and {ours} in the sweep; move that \
-             folder away or change the sweep"
+            "{} has a run of another configuration: `{key}` is {theirs} there and {ours} in the sweep; move that \
+             folder away or change the sweep",
+            run.folder.display()
         );
     }
     if !run.folder.join(checkpoint::FILE).exists() {
