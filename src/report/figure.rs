@@ -1,6 +1,7 @@
 //! Line figures as SVG text: one look for all of them.
 
-use plotters::coord::types::RangedCoordf64;
+mod draw;
+
 use plotters::prelude::*;
 
 /// Colours that stay apart in print and for colour-blind readers (Okabe & Ito 2008).
@@ -17,6 +18,24 @@ pub mod colour {
     pub const PURPLE: RGBColor = RGBColor(170, 80, 150);
     /// What only serves comparison.
     pub const GREY: RGBColor = RGBColor(120, 120, 120);
+    /// What must not be overlooked.
+    pub const BLACK: RGBColor = RGBColor(0, 0, 0);
+}
+
+/// How a series of points is drawn. Strokes and marks tell series apart where colours do not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Stroke {
+    /// A line through the points.
+    #[default]
+    Solid,
+    /// A broken line through the points.
+    Dashed,
+    /// The points only, as discs.
+    Dots,
+    /// The points only, as rings.
+    Rings,
+    /// The points only, as filled squares.
+    Squares,
 }
 
 /// One series of points.
@@ -28,22 +47,60 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
     /// Its colour.
     pub colour: RGBColor,
-    /// Whether only its points are drawn, as dots.
-    pub dotted: bool,
-    /// Width of the stroke in pixels.
+    /// How it is drawn.
+    pub stroke: Stroke,
+    /// Width of the stroke, or radius of the marks, in pixels.
     pub width: u32,
 }
 
 impl Line {
     /// A solid line.
     pub fn solid(label: impl Into<String>, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), points, colour, dotted: false, width: 2 }
+        Self { label: label.into(), points, colour, stroke: Stroke::Solid, width: 2 }
+    }
+
+    /// A broken line.
+    pub fn dashed(label: impl Into<String>, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
+        Self { stroke: Stroke::Dashed, ..Self::solid(label, colour, points) }
     }
 
     /// A row of dots.
     pub fn dots(label: impl Into<String>, colour: RGBColor, points: Vec<(f64, f64)>) -> Self {
-        Self { dotted: true, ..Self::solid(label, colour, points) }
+        Self { stroke: Stroke::Dots, ..Self::solid(label, colour, points) }
     }
+
+    /// A row of marks of this kind and radius.
+    pub fn marks(
+        label: impl Into<String>,
+        colour: RGBColor,
+        stroke: Stroke,
+        radius_px: u32,
+        points: Vec<(f64, f64)>,
+    ) -> Self {
+        Self { stroke, width: radius_px, ..Self::solid(label, colour, points) }
+    }
+}
+
+/// A shaded stretch between two curves, such as an interval around a line.
+#[derive(Debug, Clone)]
+pub struct Band {
+    /// Its colour, drawn transparent.
+    pub colour: RGBColor,
+    /// Place on the horizontal axis, lower and upper end, in data units.
+    pub points: Vec<(f64, f64, f64)>,
+}
+
+/// An interval as a vertical bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whisker {
+    /// Its colour.
+    pub colour: RGBColor,
+    /// Place on the horizontal axis, in data units.
+    pub x: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
 }
 
 /// One system of axes.
@@ -57,6 +114,10 @@ pub struct Panel {
     pub y_label: String,
     /// What is drawn.
     pub lines: Vec<Line>,
+    /// Shaded below the lines.
+    pub bands: Vec<Band>,
+    /// Intervals around points.
+    pub whiskers: Vec<Whisker>,
     /// A map: a metre is as long on either axis.
     pub equal_scales: bool,
     /// The vertical axis is logarithmic.
@@ -65,6 +126,9 @@ pub struct Panel {
     pub close_up: bool,
     /// Where the legend stands.
     pub legend: LegendPlace,
+    /// Width and height in pixels; those of an ordinary panel if not given. A figure gives every panel
+    /// the largest that one of them asks for.
+    pub size_px: Option<(u32, u32)>,
 }
 
 /// Where a legend stands, so that it covers no line.
@@ -75,6 +139,14 @@ pub enum LegendPlace {
     UpperLeft,
     /// In the middle of the upper edge.
     UpperMiddle,
+    /// In the upper right corner.
+    UpperRight,
+    /// In the lower right corner.
+    LowerRight,
+    /// In the lower left corner.
+    LowerLeft,
+    /// In the corner with the fewest points of lines.
+    Emptiest,
 }
 
 /// Panels side by side, `columns` in a row.
@@ -86,17 +158,16 @@ pub struct Figure {
     pub columns: usize,
 }
 
-const PANEL_PX: (u32, u32) = (460, 360);
-const FONT: (&str, u32) = ("sans-serif", 14);
-const TITLE_FONT: (&str, u32) = ("sans-serif", 17);
-const X_LABEL_PX: u32 = 38;
-const Y_LABEL_PX: u32 = 58;
-const MARGIN_PX: u32 = 10;
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Failure = Box<dyn std::error::Error + Send + Sync>;
+/// Why a figure could not be drawn.
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 impl Figure {
+    /// One panel.
+    #[must_use]
+    pub fn single(panel: Panel) -> Self {
+        Self { panels: vec![panel], columns: 1 }
+    }
+
     /// The figure as SVG text.
     ///
     /// # Errors
@@ -105,143 +176,27 @@ impl Figure {
     pub fn to_svg(&self) -> Result<String, Failure> {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
         let rows = self.panels.len().div_ceil(columns);
-        let size = (PANEL_PX.0 * columns as u32, PANEL_PX.1 * rows as u32);
+        let sizes = || self.panels.iter().map(|panel| panel.size_px.unwrap_or(PANEL_PX));
+        let panel_px = (
+            sizes().map(|size| size.0).max().unwrap_or(PANEL_PX.0),
+            sizes().map(|size| size.1).max().unwrap_or(PANEL_PX.1),
+        );
+        let size = (panel_px.0 * columns as u32, panel_px.1 * rows as u32);
         let mut svg = String::new();
         {
             let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-            root.fill(&WHITE).map_err(failure)?;
+            root.fill(&WHITE).map_err(draw::failure)?;
             for (panel, area) in self.panels.iter().zip(root.split_evenly((rows, columns))) {
-                panel.draw(&area)?;
+                panel.draw(&area, panel_px)?;
             }
-            root.present().map_err(failure)?;
+            root.present().map_err(draw::failure)?;
         }
         Ok(svg)
     }
 }
 
-impl Panel {
-    fn draw(&self, area: &Area<'_>) -> Result<(), Failure> {
-        let points = || self.lines.iter().flat_map(|line| line.points.iter().copied());
-        let x = Range::of(points().map(|point| point.0)).ok_or("a figure without points")?;
-        let y = Range::of(points().map(|point| point.1).filter(|&y| !self.logarithmic || y > 0.0))
-            .ok_or("a figure without points")?;
-        let mut chart = ChartBuilder::on(area);
-        chart
-            .caption(&self.title, TITLE_FONT)
-            .margin(MARGIN_PX)
-            .x_label_area_size(X_LABEL_PX)
-            .y_label_area_size(Y_LABEL_PX);
-        if self.logarithmic {
-            let chart = chart
-                .build_cartesian_2d(x.low..x.high, (y.low * 0.9..y.high * 1.1).log_scale())
-                .map_err(failure)?;
-            self.fill(chart)
-        } else {
-            let (x, y) = match (self.equal_scales, self.close_up) {
-                (true, _) => equal(x, y),
-                (false, true) => (x, y.widened()),
-                (false, false) => (x, y.padded()),
-            };
-            let chart = chart.build_cartesian_2d(x.low..x.high, y.low..y.high).map_err(failure)?;
-            self.fill(chart)
-        }
-    }
-
-    fn fill<'a, 'b: 'a, Y>(
-        &self,
-        mut chart: ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, Y>>,
-    ) -> Result<(), Failure>
-    where
-        Y: Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
-    {
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(BLACK.mix(0.12))
-            .x_desc(&self.x_label)
-            .y_desc(&self.y_label)
-            .x_labels(6)
-            .y_labels(6)
-            .label_style(FONT)
-            .axis_desc_style(FONT)
-            .draw()
-            .map_err(failure)?;
-        for line in &self.lines {
-            let (colour, width) = (line.colour, line.width);
-            let series = if line.dotted {
-                let dots = line.points.iter().map(|&point| Circle::new(point, width, colour.filled()));
-                chart.draw_series(dots).map_err(failure)?
-            } else {
-                let stroke = colour.stroke_width(width);
-                chart.draw_series(LineSeries::new(line.points.iter().copied(), stroke)).map_err(failure)?
-            };
-            if !line.label.is_empty() {
-                series.label(&line.label).legend(move |(x, y)| {
-                    PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(width))
-                });
-            }
-        }
-        if self.lines.iter().any(|line| !line.label.is_empty()) {
-            chart
-                .configure_series_labels()
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font(FONT)
-                .position(match self.legend {
-                    LegendPlace::UpperLeft => SeriesLabelPosition::UpperLeft,
-                    LegendPlace::UpperMiddle => SeriesLabelPosition::UpperMiddle,
-                })
-                .draw()
-                .map_err(failure)?;
-        }
-        Ok(())
-    }
-}
-
-fn failure(error: impl std::fmt::Display) -> Failure {
-    error.to_string().into()
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Range {
-    low: f64,
-    high: f64,
-}
-
-impl Range {
-    /// Of the finite values; never of no length.
-    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let finite = values.filter(|value| value.is_finite());
-        let range = finite.fold(None, |range: Option<Self>, value| {
-            let Self { low, high } = range.unwrap_or(Self { low: value, high: value });
-            Some(Self { low: low.min(value), high: high.max(value) })
-        })?;
-        Some(if range.high > range.low { range } else { Self { high: range.low + 1.0, ..range } })
-    }
-
-    fn widened(self) -> Self {
-        let margin = 0.05 * (self.high - self.low);
-        Self { low: self.low - margin, high: self.high + margin }
-    }
-
-    fn padded(self) -> Self {
-        let widened = self.widened();
-        Self { low: if self.low >= 0.0 { 0.0 } else { widened.low }, ..widened }
-    }
-
-    fn around(self, length: f64) -> Self {
-        let middle = 0.5 * (self.low + self.high);
-        Self { low: middle - 0.5 * length, high: middle + 0.5 * length }
-    }
-}
-
-/// Widens one of two ranges so that a unit has the same length on either axis of a panel.
-fn equal(x: Range, y: Range) -> (Range, Range) {
-    let width_px = f64::from(PANEL_PX.0 - Y_LABEL_PX - 2 * MARGIN_PX);
-    let height_px = f64::from(PANEL_PX.1 - X_LABEL_PX - 2 * MARGIN_PX - TITLE_FONT.1 * 2);
-    let per_px = 1.1 * ((x.high - x.low) / width_px).max((y.high - y.low) / height_px);
-    (x.around(per_px * width_px), y.around(per_px * height_px))
-}
+/// Width and height of an ordinary panel.
+const PANEL_PX: (u32, u32) = (460, 360);
 
 #[cfg(test)]
 mod tests {
@@ -274,11 +229,32 @@ mod tests {
     }
 
     #[test]
-    fn a_map_has_equal_scales() {
-        let (x, y) = equal(Range { low: 0.0, high: 100.0 }, Range { low: 0.0, high: 10.0 });
-        let width_px = f64::from(PANEL_PX.0 - Y_LABEL_PX - 2 * MARGIN_PX);
-        let height_px = f64::from(PANEL_PX.1 - X_LABEL_PX - 2 * MARGIN_PX - TITLE_FONT.1 * 2);
-        assert!(((x.high - x.low) / width_px - (y.high - y.low) / height_px).abs() < 1e-9);
-        assert!(y.low < -20.0 && y.high > 30.0);
+    fn every_stroke_band_and_interval_is_drawn() {
+        let points = || vec![(0.0, 1.0), (1.0, 2.0), (2.0, 1.5)];
+        let marks = |stroke| Line::marks("", colour::GREEN, stroke, 4, points());
+        let with = |lines| Figure::single(Panel { lines, ..Panel::default() }).to_svg().unwrap();
+        let solid = with(vec![Line::solid("", colour::BLUE, points())]);
+        let dashed = with(vec![Line::dashed("", colour::BLUE, points())]);
+        assert!(dashed.matches("<polyline").count() > solid.matches("<polyline").count() + 10);
+        assert_eq!(with(vec![marks(Stroke::Dots)]).matches("<circle").count(), 3);
+        let rings = with(vec![marks(Stroke::Rings)]);
+        assert_eq!((rings.matches("<circle").count(), rings.matches("fill=\"none\"").count() > 2), (3, true));
+        // One rectangle is the background.
+        assert_eq!(with(vec![marks(Stroke::Squares)]).matches("<rect").count(), 4);
+
+        let band = Band { colour: colour::BLUE, points: vec![(0.0, -9.0, 9.0), (1.0, -9.0, 9.0)] };
+        let whisker = Whisker { colour: colour::BLUE, x: 1.0, low: -30.0, high: 30.0 };
+        let panel = panel(points());
+        let svg =
+            Figure::single(Panel { bands: vec![band], whiskers: vec![whisker], ..panel }).to_svg().unwrap();
+        assert_eq!(svg.matches("<polygon").count(), 1);
+        assert!(svg.contains("\n-20.0\n") && svg.contains("\n20.0\n"), "the axis reaches the interval");
+    }
+
+    #[test]
+    fn a_wide_panel_makes_the_figure_wide() {
+        let wide = Panel { size_px: Some((900, 300)), ..panel(vec![(0.0, 1.0), (1.0, 2.0)]) };
+        let svg = Figure::single(wide).to_svg().unwrap();
+        assert!(svg.contains("width=\"900\" height=\"300\""), "{}", &svg[..200]);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::xml_escaped;
 use crate::ais::{Area, iso_utc};
 use crate::angle::Nautical;
 use crate::geo::{Geodetic, LocalPlane, M_PER_NMI, MPS_PER_KNOT, Position, wrap_longitude_deg};
@@ -122,7 +123,7 @@ impl Frame {
 <text x="{left}" y="56" fill="#5b6b79">{tracks} of {vessels}{when}</text>
 <rect x="{left}" y="{top}" width="{map_width:.1}" height="{map_height:.1}" fill="#f3f8fc"/>
 "##,
-            name = escaped(&area.name),
+            name = xml_escaped(&area.name),
             map_width = self.width_px,
             map_height = self.height_px,
             tracks = counted(tracks.len(), "track"),
@@ -376,10 +377,6 @@ fn counted(many: usize, what: &str) -> String {
 
 fn minutes(unix_s: i64) -> String {
     iso_utc(unix_s)[..16].replace('T', " ") + " UTC"
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

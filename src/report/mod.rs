@@ -35,3 +35,9 @@ pub fn write_episode(episode: &Episode, folder: &Path) -> Result<EpisodeFiles, W
         html: replay::write(episode, folder)?,
     })
 }
+
+/// Text as it has to stand in XML.
+#[must_use]
+pub fn xml_escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
