@@ -16,12 +16,8 @@ use crate::atomic_file;
 use crate::cpa::refined::{RefineConfig, RefinedCpa, Refiner};
 use crate::cpa::sampled::DistanceCurve;
 use crate::cpa::{Cpa, CpaConfig, StraightMotion, linear};
-use crate::report::figure::{Figure, LegendPlace, Line, Panel, colour};
-
-/// Steps either side of the sampled CPA in the close-up.
-const NEAR_STEPS: f64 = 3.0;
-/// Parts in which the close-up draws a step.
-const PARTS: u32 = 20;
+use crate::experiment::smoothing_distance::Distances;
+use crate::report::figure::Figure;
 
 /// Closest point of approach of two vessels: closed form, sampled and refined
 ///
@@ -169,62 +165,8 @@ impl Results {
         Ok(())
     }
 
-    /// The paper's figure `smoothing_distance`, with the refined CPA beside the sampled one: the whole,
-    /// and the steps around the minimum, where the two differ.
+    /// The paper's figure `smoothing_distance`.
     fn figure(&self) -> Figure {
-        let curve = &self.curve;
-        let dots = |width, label: String, colour, points| Line { width, ..Line::dots(label, colour, points) };
-        let mark = |name: &str, cpa: Cpa, colour| {
-            let label = format!("{name}: {:.2} m at {:.2} s", cpa.distance_m, cpa.time_s);
-            dots(5, label, colour, vec![(cpa.time_s, cpa.distance_m)])
-        };
-        let marks = || {
-            [
-                mark("sampled CPA", self.sampled, colour::ORANGE),
-                mark("refined CPA", self.refined.cpa, colour::GREEN),
-            ]
-        };
-        let unnamed = |line: Line| Line { label: String::new(), ..line };
-        let raw = curve.raw_m().iter().enumerate().map(|(step, &m)| (curve.time_s(step), m)).collect();
-        let sampled: Vec<_> = curve
-            .smoothed_m()
-            .iter()
-            .enumerate()
-            .map(|(index, &m)| (curve.smoothed_time_s(index), m))
-            .collect();
-
-        let mut whole = vec![
-            Line { width: 1, ..Line::solid("distance", colour::GREY, raw) },
-            Line::solid("smoothed distance", colour::BLUE, sampled.clone()),
-        ];
-        whole.extend(marks().map(unnamed));
-
-        let near = |time_s: f64| (time_s - self.sampled.time_s).abs() <= NEAR_STEPS * curve.dt_s() + 1e-9;
-        let within = (0..sampled.len().saturating_sub(1))
-            .flat_map(|index| (0..=PARTS).map(move |part| (index, f64::from(part) / f64::from(PARTS))));
-        let smooth = within
-            .map(|(index, part)| {
-                (curve.smoothed_time_s(index) + part * curve.dt_s(), curve.smoothed_within_m(index, part))
-            })
-            .filter(|point| near(point.0))
-            .collect();
-        let steps = sampled.into_iter().filter(|point| near(point.0)).collect();
-        let mut closeup = vec![
-            unnamed(Line::solid("", colour::BLUE, smooth)),
-            dots(3, "time steps".to_owned(), colour::BLUE, steps),
-        ];
-        closeup.extend(marks());
-
-        let panel = |title: String, lines| Panel {
-            title,
-            x_label: "time from now (s)".to_owned(),
-            y_label: "distance (m)".to_owned(),
-            lines,
-            legend: LegendPlace::UpperMiddle,
-            ..Panel::default()
-        };
-        let smoothing = format!("Distance, smoothed over {} steps either side", curve.half_width());
-        let around = panel("Around the smallest smoothed distance".to_owned(), closeup);
-        Figure { panels: vec![panel(smoothing, whole), Panel { close_up: true, ..around }], columns: 2 }
+        Distances { curve: &self.curve, sampled: self.sampled, refined: self.refined.cpa }.figure()
     }
 }

@@ -28,13 +28,23 @@ pub(super) struct HeldOut {
 
 /// Recorded tracks to be measured on instead of the model's own: an area that training never saw.
 #[derive(Debug, Clone, clap::Args)]
-pub(super) struct OtherArea {
+pub(in crate::cli) struct OtherArea {
     /// Measure on another area (TOML), all of its tracks; needs --ais.
     #[arg(long, requires = "ais")]
     area: Option<PathBuf>,
     /// AIS files of that area.
     #[arg(long, num_args = 1.., requires = "area")]
     ais: Vec<PathBuf>,
+}
+
+impl OtherArea {
+    /// The model's own data.
+    pub const NONE: Self = Self { area: None, ais: Vec::new() };
+
+    /// The area file, where another area was asked for.
+    pub fn area(&self) -> Option<&Path> {
+        self.area.as_deref()
+    }
 }
 
 pub(super) fn training_source(config: &ModelConfig) -> anyhow::Result<Training> {

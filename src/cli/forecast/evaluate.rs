@@ -9,12 +9,13 @@ use clap::Args as ClapArgs;
 use super::data::{self, HeldOut, OtherArea};
 use super::plot;
 use crate::cli::table::table;
+use crate::experiment::forecasts::Measured;
+use crate::experiment::prediction_rmse;
 use crate::forecast::{
     BestLinearForecaster, DataConfig, Errors, Evaluation, EvaluationConfig, Forecaster, LstmForecaster,
     Model, NoiseErrors, Quantiles, RouteErrors, evaluate, quantiles_of,
 };
 use crate::nn::weights::WeightsFile;
-use crate::report::figure::Figure;
 
 /// Options of `searoom forecast evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -58,7 +59,7 @@ pub(super) fn run(args: &EvaluateArgs, out: &mut dyn Write) -> anyhow::Result<()
         bail!("--segments and --horizon have to be 1 or more");
     }
     let model = Model::from_file(WeightsFile::open(&args.model)?)?;
-    let (dt_s, horizon) = (model.config.dt_s(), args.horizon.unwrap_or(model.config.kind.horizon()));
+    let horizon = args.horizon.unwrap_or(model.config.kind.horizon());
     let held_out = data::held_out(&model.config, &args.other, horizon, args.segments, args.seed)?;
     let mut forecaster = LstmForecaster::new(model, args.threads);
     let evaluation = measure(&mut forecaster, &held_out, &EvaluationConfig::default())?;
@@ -68,8 +69,9 @@ pub(super) fn run(args: &EvaluateArgs, out: &mut dyn Write) -> anyhow::Result<()
         write_tables(&evaluation, out)?;
     }
     if let Some(path) = &args.plot {
-        let panel = plot::error_panel(&evaluation.model, dt_s, evaluation.segments, &evaluation.steps);
-        plot::write(&Figure { panels: vec![panel], columns: 1 }, path)?;
+        let measured = Measured::new(forecaster.model(), evaluation, args.other.area());
+        let svg = prediction_rmse::make(&[measured]).to_svg().map_err(anyhow::Error::from_boxed)?;
+        plot::write_svg(&svg, path)?;
     }
     Ok(())
 }

@@ -4,8 +4,9 @@ use std::io::Write;
 
 use clap::{Args as ClapArgs, Subcommand};
 
-mod data;
+pub(in crate::cli) mod data;
 mod evaluate;
+pub(in crate::cli) mod figures;
 mod plot;
 mod train;
 

@@ -32,7 +32,7 @@ mod risk;
 pub use config::{MotionKind, OpenWaterConfig};
 pub use field::{Agent, Field, HISTORY_POSITIONS, Obstacle, Passing, PassingRule};
 pub use path::DesiredPath;
-pub use risk::RiskEstimates;
+pub use risk::{RiskEstimates, to_position};
 
 use nalgebra::Vector2;
 
@@ -41,7 +41,6 @@ use crate::forecast::Forecaster;
 use crate::geo::Velocity;
 use crate::vessel::VesselState;
 use crate::world::{Bow, Hull, HullError, PairReport, VesselBody, VesselId, World, WorldConfig};
-use risk::to_position;
 
 /// The environment.
 pub struct OpenWater {
@@ -77,6 +76,12 @@ impl OpenWater {
         let risk = forecaster.map(|forecaster| RiskEstimates::new(&config, forecaster));
         let terms = [RewardTerm { name: "wrong_passings", value: 0.0 }];
         Ok(Self { config, field, world, states, risk, order: Vec::new(), terms })
+    }
+
+    /// The constants in use.
+    #[must_use]
+    pub fn config(&self) -> &OpenWaterConfig {
+        &self.config
     }
 
     /// Agent, obstacles and desired path as they are now.
