@@ -9,6 +9,7 @@ mod browser;
 mod cli;
 mod cpa;
 mod cpa_cli;
+mod experiment;
 mod forecast;
 mod forecast_network;
 mod nn_allocation;

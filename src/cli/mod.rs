@@ -16,6 +16,7 @@ mod cache;
 pub mod cpa;
 pub mod env;
 pub mod evaluate;
+pub mod experiment;
 pub mod export;
 pub mod forecast;
 mod policies;
@@ -76,6 +77,8 @@ subcommands! {
     Evaluate(evaluate),
     /// Put the agent of a run into one file
     Export(export),
+    /// Make the paper's figures, each with one command
+    Experiment(experiment),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
     /// Closest point of approach of two vessels: closed form, sampled and refined
