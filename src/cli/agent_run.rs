@@ -7,11 +7,12 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use serde::Serialize;
 
-use super::{cache, recorded};
+use super::{cache, progress, recorded};
 use crate::agent::{RunConfig, TracksConfig};
-use crate::env::coastal::{Coastal, RecordedTraffic};
+use crate::env::coastal::{Coastal, CoastalConfig, LivePaths, PathSource, RecordedTraffic, TablePaths};
 use crate::env::open_water::OpenWater;
 use crate::env::{Env, EnvName};
+use crate::forecast::sample_table::{SampleTable, TableFile};
 use crate::forecast::{Forecaster, LstmForecaster, Model, split_by_time};
 use crate::geo::Geodetic;
 use crate::nn::weights::WeightsFile;
@@ -34,6 +35,8 @@ pub struct EnvMaker {
     config: RunConfig,
     model: Option<Model>,
     traffic: Option<Arc<RecordedTraffic>>,
+    /// Forecasts of recorded vessels that episodes share.
+    table: Option<Arc<SampleTable>>,
 }
 
 impl EnvMaker {
@@ -44,14 +47,25 @@ impl EnvMaker {
             EnvName::OpenWater => None,
             EnvName::Coastal => Some(load_traffic(config, part, model.as_ref())?),
         };
-        Ok(Self { config: config.clone(), model, traffic })
+        Ok(Self { config: config.clone(), model, traffic, table: None })
+    }
+
+    /// Makes all forecasts that episodes can ask for beforehand, where they do not depend on the episode: worth
+    /// its time for thousands of episodes.
+    pub fn share_forecasts(&mut self) -> anyhow::Result<()> {
+        if let (Some(model), Some(traffic)) = (&self.model, &self.traffic)
+            && self.config.coastal.forecasts_depend_on_tracks_alone()
+        {
+            self.table = Some(Arc::new(forecast_table(model, traffic, &self.config.coastal)?));
+        }
+        Ok(())
     }
 
     /// The same environments without estimates: the same episodes at less cost.
     #[must_use]
     pub fn without_estimates(&self) -> Self {
         let config = RunConfig { estimates: false, ..self.config.clone() };
-        Self { config, model: None, traffic: self.traffic.clone() }
+        Self { config, model: None, traffic: self.traffic.clone(), table: None }
     }
 
     /// An environment, with its forecaster on one thread.
@@ -70,8 +84,14 @@ impl EnvMaker {
     /// The coastal environment of this configuration.
     pub fn coastal(&self) -> anyhow::Result<Coastal> {
         let traffic = self.traffic.as_ref().context("the configuration is of another environment")?;
-        let env = Coastal::new(self.config.coastal.clone(), Arc::clone(traffic), self.forecaster());
-        env.context("key \"coastal\"")
+        let config = self.config.coastal.clone();
+        let paths: Option<Box<dyn PathSource>> = match &self.table {
+            Some(table) => Some(Box::new(TablePaths::new(Arc::clone(table)))),
+            None => self.forecaster().map(|forecaster| -> Box<dyn PathSource> {
+                Box::new(LivePaths::new(forecaster, config.noise_m == 0.0))
+            }),
+        };
+        Coastal::with_paths(config, Arc::clone(traffic), paths).context("key \"coastal\"")
     }
 
     fn forecaster(&self) -> Option<Box<dyn Forecaster>> {
@@ -92,6 +112,31 @@ pub fn load_forecaster(config: &RunConfig) -> anyhow::Result<Model> {
             file.display()
         )
     })
+}
+
+/// The forecasts of every sample that episodes can ask for: those of an earlier command, or new ones on all cores.
+fn forecast_table(
+    model: &Model,
+    traffic: &RecordedTraffic,
+    config: &CoastalConfig,
+) -> anyhow::Result<SampleTable> {
+    let (samples, steps) = (traffic.forecast_samples(config), config.forecast_steps);
+    let tracks: Vec<&Track> = traffic.tracks().collect();
+    let bytes = model.to_file().to_bytes();
+    let file = cache::folder()?.map(|folder| TableFile::of(&folder, &bytes, &tracks, &samples, steps));
+    if let Some(table) = file.as_ref().and_then(|file| file.read(&samples, steps)) {
+        return Ok(table);
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let forecaster = &mut LstmForecaster::new(model.clone(), threads);
+    let bar = progress::steps(samples.len() as u64, "forecasts");
+    let table = SampleTable::forecast(forecaster, &tracks, &samples, steps, &mut |done| bar.inc(done as u64))
+        .context("key \"tracks\"")?;
+    bar.finish_and_clear();
+    if let Some(Err(error)) = file.map(|file| file.write(&table)) {
+        eprintln!("note: the forecasts were not kept for the next time: {error}");
+    }
+    Ok(table)
 }
 
 fn load_traffic(

@@ -9,23 +9,28 @@ use crate::scenario::starts_cache::StartsCache;
 /// Names the folder, or switches the cache off.
 const VARIABLE: &str = "SEAROOM_CACHE";
 
-/// The cache of encounter starts: in the folder that `SEAROOM_CACHE` names, else in the user's cache folder; none
-/// where the variable says `off`, or where there is no such folder.
-pub(super) fn encounter_starts() -> anyhow::Result<StartsCache> {
+/// The folder that `SEAROOM_CACHE` names, else `searoom` in the user's cache folder; none where the variable says
+/// `off`, or where there is no such folder.
+pub(super) fn folder() -> anyhow::Result<Option<PathBuf>> {
     let given = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     if let Some(value) = given(VARIABLE) {
         if value == "off" {
-            return Ok(StartsCache::off());
+            return Ok(None);
         }
         let folder = PathBuf::from(value);
         if folder.is_file() {
             bail!("{VARIABLE} names the file {}: name a folder, or `off`", folder.display());
         }
-        return Ok(StartsCache::in_folder(folder));
+        return Ok(Some(folder));
     }
     let user = given("XDG_CACHE_HOME")
         .or_else(|| given("LOCALAPPDATA"))
         .map(PathBuf::from)
         .or_else(|| given("HOME").map(|home| PathBuf::from(home).join(".cache")));
-    Ok(user.map_or_else(StartsCache::off, |folder| StartsCache::in_folder(folder.join("searoom"))))
+    Ok(user.map(|folder| folder.join("searoom")))
+}
+
+/// The cache of encounter starts.
+pub(super) fn encounter_starts() -> anyhow::Result<StartsCache> {
+    Ok(folder()?.map_or_else(StartsCache::off, StartsCache::in_folder))
 }

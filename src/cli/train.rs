@@ -70,7 +70,8 @@ pub struct Args {
 pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     args.pace.check()?;
     let (folder, config) = resolve(&args)?;
-    let envs = EnvMaker::new(&config, TracksPart::Training)?;
+    let mut envs = EnvMaker::new(&config, TracksPart::Training)?;
+    envs.share_forecasts()?;
     let compute = Compute::new(args.threads.max(1));
     let watcher = Terminal { bar: progress::steps(config.steps, "training"), interrupted: interrupted()? };
     let started = Instant::now();

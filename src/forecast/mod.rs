@@ -26,6 +26,7 @@ mod linear;
 mod lstm;
 mod model;
 pub mod network;
+pub mod sample_table;
 mod segment;
 mod split;
 mod training;

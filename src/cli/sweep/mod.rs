@@ -212,7 +212,9 @@ impl Shared {
         if let Some(envs) = envs.get(&key) {
             return Ok(Arc::clone(envs));
         }
-        let made = Arc::new(EnvMaker::new(config, TracksPart::Training)?);
+        let mut made = EnvMaker::new(config, TracksPart::Training)?;
+        made.share_forecasts()?;
+        let made = Arc::new(made);
         envs.insert(key, Arc::clone(&made));
         Ok(made)
     }

@@ -113,6 +113,13 @@ impl CoastalConfig {
         let per_obstacle = if estimates { 6 } else { 4 };
         2 + per_obstacle * self.obstacles()
     }
+
+    /// Whether forecasts of recorded vessels are the same in every episode that comes by a sample: they are asked
+    /// for, and what is shown to the forecaster is free of noise.
+    #[must_use]
+    pub fn forecasts_depend_on_tracks_alone(&self) -> bool {
+        self.estimates == EstimateSource::Forecast && self.noise_m == 0.0
+    }
 }
 
 impl Default for CoastalConfig {

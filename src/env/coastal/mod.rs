@@ -37,9 +37,10 @@ mod situation;
 mod traffic;
 
 pub use config::{CoastalConfig, EstimateSource, ScenarioChoice};
-pub use paths::{KnownPaths, LivePaths, Moment, Path, PathSource};
+pub use paths::{KnownPaths, LivePaths, Moment, Path, PathSource, TablePaths};
 pub use traffic::{Opening, SensorNoise};
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -51,6 +52,7 @@ use observation::{SensedObstacle, SensedOwn};
 use super::{ActionError, Env, RewardTerm, Step, check_action};
 use crate::cpa::linear::closest_approach;
 use crate::cpa::{Cpa, CpaConfig, Estimator, StraightMotion};
+use crate::forecast::sample_table::Sample;
 use crate::forecast::{Basis, Forecaster};
 use crate::geo::Position;
 use crate::scenario::encounter_starts::{HeadOnKind, HeadOnStart, HeadOnStarts};
@@ -139,6 +141,28 @@ impl RecordedTraffic {
     #[must_use]
     pub fn starts(&self) -> &HeadOnStarts {
         &self.starts
+    }
+
+    /// The tracks, in the order that starts refer to.
+    pub fn tracks(&self) -> impl Iterator<Item = &Track> {
+        self.replays.iter().map(Recorded::track)
+    }
+
+    /// Every sample at which an episode can ask for a forecast, for [`TablePaths`].
+    #[must_use]
+    pub fn forecast_samples(&self, config: &CoastalConfig) -> BTreeSet<Sample> {
+        let per_decision = self.steps_per_decision(config);
+        let starts = config.scenario.kinds().iter().flat_map(|kind| self.starts.of(*kind));
+        let decisions = (0..=config.decisions).step_by(config.forecast_every_decisions.max(1));
+        starts
+            .flat_map(|start| decisions.clone().map(|n| (start.track, start.index + n * per_decision)))
+            .collect()
+    }
+
+    /// Time steps from one decision to the next.
+    #[must_use]
+    pub fn steps_per_decision(&self, config: &CoastalConfig) -> usize {
+        (config.head_on.decision_interval_s / self.dt_s).round().max(1.0) as usize
     }
 
     fn replay(&self, start: HeadOnStart) -> Recorded {
@@ -304,7 +328,7 @@ impl Coastal {
     }
 
     fn steps_per_decision(&self) -> usize {
-        (self.config.head_on.decision_interval_s / self.traffic.dt_s).round().max(1.0) as usize
+        self.traffic.steps_per_decision(&self.config)
     }
 
     fn read_states(states: &mut Vec<VesselState>, episode: &Episode, step: i64) {

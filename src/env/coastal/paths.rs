@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use crate::forecast::sample_table::SampleTable;
 use crate::forecast::{Basis, ForecastError, Forecaster, Forecasts};
 use crate::geo::Position;
 
@@ -64,6 +65,26 @@ impl PathSource for LivePaths {
             known.insert(moment.sample, path.clone());
         }
         Some(path)
+    }
+}
+
+/// Forecasts of the samples of noise-free tracks, made beforehand. Its clones share them.
+#[derive(Debug, Clone)]
+pub struct TablePaths(Arc<SampleTable>);
+
+impl TablePaths {
+    /// From a table, which should hold every sample that episodes can ask for:
+    /// [`RecordedTraffic::forecast_samples`](super::RecordedTraffic::forecast_samples).
+    #[must_use]
+    pub fn new(table: Arc<SampleTable>) -> Self {
+        Self(table)
+    }
+}
+
+impl PathSource for TablePaths {
+    fn path(&mut self, moment: Moment, history: &[Position], _steps: usize) -> Option<Path> {
+        let (positions, basis) = self.0.path(moment.sample, *history.last()?)?;
+        Some(Path { positions: positions.into(), basis })
     }
 }
 

@@ -3,6 +3,7 @@ use std::f64::consts::PI;
 use super::*;
 use crate::angle::Nautical;
 use crate::forecast::LinearForecaster;
+use crate::forecast::sample_table::SampleTable;
 use crate::geo::{Displacement, Velocity};
 use crate::policy::{Policy, Situation};
 use crate::track::VesselParticulars;
@@ -275,6 +276,27 @@ fn known_paths_give_the_observations_of_live_ones() {
     // Of an episode that nobody forecast nothing is known.
     episode(&mut shared, 3, 0.4);
     assert_eq!(shared.fallbacks(), 8);
+}
+
+/// A table of the samples has every forecast that an episode without noise can ask for.
+#[test]
+fn a_table_of_samples_gives_the_observations_of_live_paths() {
+    let config = CoastalConfig::default();
+    let traffic = traffic(&config);
+    let samples = traffic.forecast_samples(&config);
+    let tracks: Vec<&Track> = traffic.tracks().collect();
+    let forecaster = &mut LinearForecaster::over(75);
+    let table = SampleTable::forecast(forecaster, &tracks, &samples, config.forecast_steps, &mut |_| ());
+    let paths = TablePaths::new(Arc::new(table.unwrap()));
+    let mut live = env(config.clone(), true);
+    let mut shared = Coastal::with_paths(config, Arc::clone(&traffic), Some(Box::new(paths))).unwrap();
+    for seed in 0..6 {
+        for (ours, theirs) in episode(&mut live, seed, 0.4).iter().zip(episode(&mut shared, seed, 0.4)) {
+            // The table keeps positions to a millimetre.
+            assert!(ours.iter().zip(&theirs).all(|(a, b)| (a - b).abs() < 1e-4), "{ours:?} {theirs:?}");
+        }
+    }
+    assert_eq!(shared.fallbacks(), 0);
 }
 
 /// Keeps what it was shown, and turns to starboard at every decision.
