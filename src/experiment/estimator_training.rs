@@ -12,7 +12,7 @@ use crate::report::figure::{Figure, Line, Panel, colour};
 /// Why a file is no log of a forecaster's training.
 #[derive(Debug, Error)]
 #[error(
-    "{}: {reason}; it has to be the log.csv that `searoom forecast train` wrote (step,loss_m2,learning_rate,gradient_norm)",
+    "{}: {reason}; it has to be the log.csv that `searoom forecast train` wrote (step,loss_m,learning_rate,gradient_norm)",
     path.display()
 )]
 pub struct LogError {
@@ -25,8 +25,8 @@ pub struct LogError {
 pub struct LogLine {
     /// Updates made.
     pub step: u64,
-    /// Loss, in square metres per displacement.
-    pub loss_m2: f64,
+    /// Loss in metres: of a displacement in the first stage, of a whole path in those that unroll.
+    pub loss_m: f64,
     /// Learning rate.
     pub learning_rate: f64,
     /// Norm of the gradient.
@@ -72,23 +72,23 @@ impl TrainingLog {
 /// One panel for each log.
 #[must_use]
 pub fn make(logs: &[TrainingLog]) -> Product {
-    let mut data = DataTable::new(&["run", "step", "loss_m2", "learning_rate", "gradient_norm"]);
+    let mut data = DataTable::new(&["run", "step", "loss_m", "learning_rate", "gradient_norm"]);
     let (mut panels, mut ran) = (Vec::new(), Vec::new());
     for log in logs {
         for line in &log.lines {
             data.push(data_row![
                 log.name.as_str(),
                 line.step,
-                line.loss_m2,
+                line.loss_m,
                 line.learning_rate,
                 line.gradient_norm
             ]);
         }
-        let losses = log.lines.iter().map(|line| (line.step as f64 / 1000.0, line.loss_m2)).collect();
+        let losses = log.lines.iter().map(|line| (line.step as f64 / 1000.0, line.loss_m)).collect();
         panels.push(Panel {
             title: log.name.clone(),
             x_label: "updates (thousands)".into(),
-            y_label: "loss per displacement (m\u{b2})".into(),
+            y_label: "loss (m)".into(),
             lines: vec![Line::solid("", colour::BLUE, losses)],
             logarithmic: true,
             ..Panel::default()
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn losses_are_drawn_and_told() {
-        let text = "step,loss_m2,learning_rate,gradient_norm\n50,120.5,0.001,3.5\n100,20.5,0.002,2.5\n";
+        let text = "step,loss_m,learning_rate,gradient_norm\n50,120.5,0.001,3.5\n100,20.5,0.002,2.5\n";
         let parse = |text: &str| {
             TrainingLog::parse("periodic".into(), Path::new("runs/periodic/log.csv"), text, Some(1), None)
         };
@@ -127,8 +127,8 @@ mod tests {
             "{}",
             product.caption
         );
-        assert!(product.to_svg().unwrap().contains("loss per displacement"));
-        for text in ["", "step,loss\n1,2\n", "step,loss_m2,learning_rate,gradient_norm\n1,x,2,3\n"] {
+        assert!(product.to_svg().unwrap().contains("loss (m)"));
+        for text in ["", "step,loss\n1,2\n", "step,loss_m,learning_rate,gradient_norm\n1,x,2,3\n"] {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.contains("runs/periodic/log.csv") && error.contains("forecast train"), "{error}");
         }

@@ -69,8 +69,7 @@ impl SegmentSource for SyntheticSegments {
         match self.process {
             Process::Stochastic(config) => {
                 let process = stochastic::Process::new(config, velocity);
-                let innovation_m = config.beta * config.innovation_sd_m * velocity.norm() / config.v_max_mps;
-                Segment { noise_m: innovation_m, ..self.follow(velocity, process, rng) }
+                self.follow(velocity, process, rng)
             }
             Process::Periodic(config) => {
                 let process = periodic::Process::new(config, velocity, rng);
@@ -104,7 +103,7 @@ impl SyntheticSegments {
         let history: Vec<Position> = (0..self.history_len).map(&mut position).collect();
         let future = (self.history_len..self.history_len + self.horizon).map(&mut position).collect();
         let present = history.last().copied().unwrap_or_default();
-        Segment { history, present, future, mmsi: None, start_unix_s: None, noise_m: 0.0 }
+        Segment { history, present, future, mmsi: None, start_unix_s: None }
     }
 }
 
@@ -264,7 +263,6 @@ impl RecordedSegments {
             future: track.positions[now..now + self.horizon].to_vec(),
             mmsi: Some(track.mmsi),
             start_unix_s: Some(track.unix_s(first)),
-            noise_m: 0.0,
         }
     }
 }
@@ -281,7 +279,6 @@ impl SegmentSource for RecordedSegments {
         let RecordedConfig { least_noise_m, most_noise_m, .. } = self.config;
         let noise_m = least_noise_m * (most_noise_m / least_noise_m).powf(rng.random::<f64>());
         disturb(&mut segment.history, noise_m, rng);
-        segment.noise_m = noise_m;
         segment
     }
 }
@@ -352,15 +349,18 @@ mod tests {
         let mut levels = Vec::new();
         for _ in 0..500 {
             let segment = segments.draw(&mut rng);
-            levels.push(segment.noise_m);
             let first = (segment.start_unix_s.unwrap() / 5.0) as usize;
-            assert_eq!(segment.future[0], segments.tracks[0].positions[first + 10]);
-            let off = segment.history[9].distance_m(segments.tracks[0].positions[first + 9]);
-            assert!(off > 0.0 && off < 6.0 * segment.noise_m, "{off}");
+            let truth = &segments.tracks[0].positions[first..];
+            assert_eq!(segment.future[0], truth[10]);
+            let squares = segment.history.iter().zip(truth).map(|(seen, at)| seen.distance_m(*at).powi(2));
+            // Two coordinates of ten positions.
+            levels.push((squares.sum::<f64>() / 20.0).sqrt());
         }
         levels.sort_by(f64::total_cmp);
-        assert!(levels[0] >= 0.2 && levels[499] <= 20.0);
-        assert!((levels[250] - 2.0).abs() < 0.5, "{}", levels[250]);
+        // Log-uniform in 0.2..20 m, seen through the spread of twenty draws.
+        assert!(levels[0] >= 0.2 * 0.4 && levels[499] <= 20.0 * 1.8);
+        assert!((levels[250] - 2.0).abs() < 0.6, "{}", levels[250]);
+        assert!(levels[50] < 0.6 && levels[450] > 6.0);
     }
 
     #[test]

@@ -88,11 +88,6 @@ impl Paths {
         self.len += encoding.outputs;
     }
 
-    /// Where the path of one row has got to.
-    pub fn now(&self, row: usize) -> Position {
-        self.positions[row * self.stride + self.len - 1]
-    }
-
     /// The positions of one row after its history.
     pub fn future(&self, encoding: &Encoding, row: usize) -> &[Position] {
         &self.positions[row * self.stride + encoding.history_len..row * self.stride + self.len]

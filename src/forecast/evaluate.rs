@@ -297,7 +297,6 @@ mod tests {
             future: path(10, 4, turn_after),
             mmsi: Some(mmsi),
             start_unix_s: Some(0.0),
-            noise_m: 0.0,
         }
     }
 

@@ -30,6 +30,7 @@ pub mod sample_table;
 mod segment;
 mod split;
 mod training;
+mod unrolled;
 
 pub use best_linear::BestLinearForecaster;
 pub use encoding::Scaling;
@@ -43,6 +44,7 @@ pub use model::{DataConfig, Model, ModelConfig, ModelError, ModelKind};
 pub use segment::{Quantiles, Segment, rmse_m};
 pub use split::{Split, SplitConfig, SplitError, split_by_time};
 pub use training::{StageConfig, Trainer, TrainingConfig, TrainingConfigError, Update};
+pub use unrolled::Loss;
 
 /// Predicts a batch of paths.
 pub trait Forecaster: Send {

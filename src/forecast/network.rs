@@ -90,6 +90,15 @@ pub struct Batch<'a, T> {
     pub rows: usize,
 }
 
+/// Where the gradients with respect to what a network has read go, in the layouts of [`Batch`].
+#[derive(Debug)]
+pub struct InputGradients<'a, T> {
+    /// With respect to the displacements.
+    pub histories: &'a mut [T],
+    /// With respect to the present positions; left alone unless the network is anchored.
+    pub anchors: &'a mut [T],
+}
+
 impl<T: Real> ForecastNetwork<T> {
     /// A network with PyTorch's default initialisation.
     pub fn new(config: NetworkConfig, rng: &mut impl Rng) -> Self {
@@ -211,7 +220,7 @@ impl<T: Real> ForecastNetwork<T> {
         let count = batch.rows * self.config.outputs();
         let output = &state.outputs[last][..count];
         let loss = mean_squared_error(output, &targets[..count], &mut state.d_outputs[last][..count]);
-        self.backward(compute, batch, state, gradients);
+        self.backward(compute, batch, state, None, gradients);
         loss
     }
 
@@ -224,12 +233,13 @@ impl<T: Real> ForecastNetwork<T> {
     }
 
     /// Adds the gradients of a loss of the caller's own, whose derivative stands in
-    /// [`loss_buffers`](Self::loss_buffers).
+    /// [`loss_buffers`](Self::loss_buffers); fills those with respect to the inputs, if asked for.
     pub fn backward(
         &self,
         compute: &mut Compute,
         batch: Batch<'_, T>,
         state: &mut NetworkState<T>,
+        inputs: Option<InputGradients<'_, T>>,
         gradients: &mut Gradients<T>,
     ) {
         let Batch { histories, rows, .. } = batch;
@@ -248,14 +258,25 @@ impl<T: Real> ForecastNetwork<T> {
                 Some(gradients),
             );
         }
+        let width = self.linear[0].inputs();
+        let mut d_histories = None;
+        if let Some(InputGradients { histories, anchors }) = inputs {
+            if self.config.anchored {
+                let d_anchors = anchors.as_chunks_mut::<COORDINATES>().0;
+                for (joined, d_anchor) in state.d_joined.chunks(width).zip(&mut d_anchors[..rows]) {
+                    d_anchor.copy_from_slice(&joined[self.config.hidden..]);
+                }
+            }
+            d_histories = Some(histories);
+        }
         self.lstm.backward(
             compute,
             &self.parameters,
             histories,
             None,
             &mut state.lstm,
-            (&state.d_joined, self.linear[0].inputs()),
-            None,
+            (&state.d_joined, width),
+            d_histories,
             Some(gradients),
         );
     }

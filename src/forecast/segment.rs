@@ -18,9 +18,6 @@ pub struct Segment {
     pub mmsi: Option<u32>,
     /// Time of the first position in seconds since 1970, where the path is a recorded one.
     pub start_unix_s: Option<f64>,
-    /// Standard deviation of what nobody can predict of it, in metres on each axis: of the noise that was added
-    /// to the history, or of the motion's own innovations; 0 where all segments are alike in this.
-    pub noise_m: f64,
 }
 
 impl Segment {
@@ -114,7 +111,6 @@ mod tests {
             future: positions(future),
             mmsi: None,
             start_unix_s: None,
-            noise_m: 0.0,
         }
     }
 

@@ -1,15 +1,7 @@
-//! Learning to forecast: the paths of a batch are extended call by call, as in use, and every call learns
-//! from where the calls before it have led.
+//! Learning to forecast: batches of segments, stage after stage, with Adam on a one-cycle schedule.
 //!
-//! The loss of a call is the mean squared difference between the displacements given and those wanted: the
-//! vessel's own, plus an even share of the way from where the path is to where the vessel was, so that a
-//! path off the truth learns to come back within `recovery_steps`. What the calls before it did is taken as
-//! given (no gradient runs through them). Since what a call is shown follows from the history alone, the
-//! wanted displacements have their conditional mean given the history as the best answer at every step, and
-//! sum up to that of the position. One call (`calls = 1`) is the paper's training on true histories.
-//!
-//! A segment seen with noise of standard deviation `s` weighs `1 / (1 + (s / noise_reference_m)^2)`: what
-//! noise makes unpredictable would drown what is not.
+//! A stage of one call on true histories is the paper's training. Later stages extend the paths of a batch
+//! call by call, as in use, and learn from where that leads (see [`super::unrolled`]).
 
 use std::f64::consts::PI;
 
@@ -20,10 +12,10 @@ use thiserror::Error;
 
 use super::Segment;
 use super::dataset::SegmentSource;
-use super::encoding::{Encoding, Paths, Scaling};
+use super::encoding::{Encoding, Scaling};
 use super::model::ModelKind;
-use super::network::{Batch, ForecastNetwork, NetworkState};
-use crate::geo::{Displacement, Position};
+use super::network::ForecastNetwork;
+use super::unrolled::{Loss, Unrolled};
 use crate::nn::{Adam, AdamConfig, Compute, Gradients, Parameters};
 
 /// A part of the training with settings of its own.
@@ -38,8 +30,8 @@ pub struct StageConfig {
     pub calls: usize,
     /// Displacements of the history shown; all that the network is made for if 0. Fewer are faster.
     pub history_steps: usize,
-    /// Steps over which a path off the truth should come back; 0 for not at all.
-    pub recovery_steps: usize,
+    /// What is made small.
+    pub loss: Loss,
     /// Peak of the one-cycle schedule.
     pub learning_rate: f64,
     /// Part of the stage over which the rate rises from `initial_fraction` of its peak; then it falls to
@@ -56,7 +48,7 @@ impl Default for StageConfig {
             batch: 32,
             calls: 1,
             history_steps: 0,
-            recovery_steps: 0,
+            loss: Loss::default(),
             learning_rate: 2e-3,
             warmup: 0.25,
             initial_fraction: 0.04,
@@ -92,8 +84,6 @@ pub struct TrainingConfig {
     pub weight_average: f64,
     /// Gradients longer than this are shortened to it.
     pub max_gradient_norm: f64,
-    /// Noise at which a segment weighs half, in metres.
-    pub noise_reference_m: f64,
     /// The optimiser's settings.
     pub adam: AdamConfig,
     /// One after the other.
@@ -108,7 +98,6 @@ impl Default for TrainingConfig {
             scaling: Scaling::default(),
             weight_average: 0.998,
             max_gradient_norm: 10.0,
-            noise_reference_m: 2.0,
             adam: AdamConfig::default(),
             stages: vec![StageConfig::default()],
         }
@@ -166,9 +155,6 @@ impl TrainingConfig {
         if !positive(self.max_gradient_norm) {
             return fault("max_gradient_norm", &self.max_gradient_norm, "use a positive number");
         }
-        if !positive(self.noise_reference_m) {
-            return fault("noise_reference_m", &self.noise_reference_m, "use a positive number of metres");
-        }
         if self.total_steps() == 0 {
             return fault("stages", &"without steps", "give at least one [[training.stages]] with steps > 0");
         }
@@ -202,8 +188,8 @@ impl TrainingConfig {
 pub struct Update {
     /// Updates done, this one included.
     pub step: u64,
-    /// Mean weighted squared error of a displacement, in square metres.
-    pub loss_m2: f64,
+    /// The loss in metres: root mean square error of a displacement, or mean error of a path.
+    pub loss_m: f64,
     /// The learning rate used.
     pub learning_rate: f64,
     /// Length of the gradient before it was shortened.
@@ -249,7 +235,7 @@ impl Trainer {
             average: network.parameters.frozen(),
             adam: Adam::new(network.parameters.layout(), config.adam.clone()),
             gradients: Gradients::zeros(network.parameters.layout()),
-            unrolled: Unrolled::new(encoding, &network),
+            unrolled: Unrolled::new(encoding),
             compute: Compute::new(threads),
             config,
             network,
@@ -293,12 +279,11 @@ impl Trainer {
     pub fn update(&mut self) -> Option<Update> {
         let (stage, done) = self.stage()?;
         let segments: Vec<Segment> = (0..stage.batch).map(|_| self.source.draw(&mut self.rng)).collect();
-        let loss_m2 = self.unrolled.loss_and_gradients(
+        let loss_m = self.unrolled.loss_and_gradients(
             &mut self.compute,
             &self.network,
             &stage,
             &segments,
-            self.config.noise_reference_m,
             &mut self.gradients,
         );
         let gradient_norm = shorten(&mut self.gradients, self.config.max_gradient_norm);
@@ -308,7 +293,7 @@ impl Trainer {
         // The mean forgets the initial weights sooner than its length would allow.
         let kept = self.config.weight_average.min(self.step as f64 / (9.0 + self.step as f64));
         self.average.follow(&mut self.compute, &self.network.parameters, 1.0 - kept);
-        Some(Update { step: self.step, loss_m2, learning_rate, gradient_norm })
+        Some(Update { step: self.step, loss_m, learning_rate, gradient_norm })
     }
 }
 
@@ -323,111 +308,6 @@ fn shorten(gradients: &mut Gradients<f32>, longest: f64) -> f64 {
         gradients.values_mut().iter_mut().for_each(|g| *g *= scale);
     }
     norm
-}
-
-/// The buffers of an unrolled batch, kept from update to update.
-struct Unrolled {
-    encoding: Encoding,
-    paths: Paths,
-    rows: usize,
-    state: NetworkState<f32>,
-    histories: Vec<f32>,
-    anchors: Vec<f32>,
-}
-
-impl Unrolled {
-    fn new(encoding: Encoding, network: &ForecastNetwork<f32>) -> Self {
-        Self {
-            encoding,
-            paths: Paths::default(),
-            rows: 0,
-            state: network.state(0),
-            histories: Vec::new(),
-            anchors: Vec::new(),
-        }
-    }
-
-    /// Loss of a batch in square metres, and its gradients.
-    fn loss_and_gradients(
-        &mut self,
-        compute: &mut Compute,
-        network: &ForecastNetwork<f32>,
-        stage: &StageConfig,
-        segments: &[Segment],
-        noise_reference_m: f64,
-        gradients: &mut Gradients<f32>,
-    ) -> f64 {
-        let (encoding, rows) = (self.encoding, segments.len());
-        let outputs = encoding.outputs;
-        let steps = match stage.history_steps {
-            0 => encoding.history_len - 1,
-            steps => steps,
-        };
-        if self.rows != rows {
-            self.rows = rows;
-            self.state = network.state(rows);
-        }
-        self.histories.resize(steps * rows * 2, 0.0);
-        self.anchors.resize(rows * 2, 0.0);
-        self.paths.start(&encoding, segments.iter().map(|segment| segment.history.as_slice()), stage.calls);
-        gradients.clear();
-        let terms = (rows * outputs * stage.calls) as f64;
-        let mut loss_m2 = 0.0;
-        for call in 0..stage.calls {
-            self.paths.encode(encoding.scaling, steps, &mut self.histories, &mut self.anchors);
-            let batch = Batch { histories: &self.histories, anchors: &self.anchors, rows };
-            network.forward(compute, batch, &mut self.state);
-            let (output, d_output) = network.loss_buffers(rows, &mut self.state);
-            let given = output.chunks(2 * outputs).zip(d_output.chunks_mut(2 * outputs));
-            for (row, (output, d_output)) in given.enumerate() {
-                let segment = &segments[row];
-                let weight = 1.0 / (1.0 + (segment.noise_m / noise_reference_m).powi(2));
-                let before =
-                    call.checked_sub(1).map_or(segment.present, |_| segment.future[call * outputs - 1]);
-                let truth = &segment.future[call * outputs..(call + 1) * outputs];
-                let wanted = Wanted::new(before, truth, self.paths.now(row), stage.recovery_steps);
-                loss_m2 += wanted.loss(output, encoding.scaling.step_m, weight / terms, d_output);
-            }
-            self.paths.extend(&encoding, output);
-            network.backward(compute, batch, &mut self.state, gradients);
-        }
-        loss_m2
-    }
-}
-
-/// The displacements that one call should give.
-struct Wanted<'a> {
-    /// Where the vessel was at the start of the call, and where it went.
-    before: Position,
-    truth: &'a [Position],
-    /// Part of the way back to the truth, at each of so many steps.
-    way_back: Displacement,
-    recovery_steps: usize,
-}
-
-impl<'a> Wanted<'a> {
-    fn new(before: Position, truth: &'a [Position], now: Position, recovery_steps: usize) -> Self {
-        let way_back = (before - now) * (1.0 / recovery_steps.max(1) as f64);
-        Self { before, truth, way_back, recovery_steps }
-    }
-
-    /// Weighted squared error of displacements in units of `scale_m`; fills their gradient.
-    fn loss(&self, output: &[f32], scale_m: f64, weight: f64, d_output: &mut [f32]) -> f64 {
-        let mut from = self.before;
-        let mut loss = 0.0;
-        let steps = output.chunks_exact(2).zip(d_output.chunks_exact_mut(2));
-        for (k, (&to, (given, gradient))) in self.truth.iter().zip(steps).enumerate() {
-            let back = if k < self.recovery_steps { self.way_back } else { Displacement::default() };
-            let wanted = to - from + back;
-            let north_m = f64::from(given[0]) * scale_m - wanted.north_m;
-            let east_m = f64::from(given[1]) * scale_m - wanted.east_m;
-            loss += weight * (north_m * north_m + east_m * east_m);
-            gradient[0] = (2.0 * weight * scale_m * north_m) as f32;
-            gradient[1] = (2.0 * weight * scale_m * east_m) as f32;
-            from = to;
-        }
-        loss
-    }
 }
 
 #[cfg(test)]
@@ -468,42 +348,11 @@ mod tests {
 
     fn two_stages() -> Vec<StageConfig> {
         let first = StageConfig { steps: 4, batch: 8, ..Default::default() };
-        vec![first, StageConfig { steps: 4, calls: 3, history_steps: 5, ..first }]
+        vec![first, StageConfig { steps: 4, calls: 3, history_steps: 5, loss: Loss::Path, ..first }]
     }
 
     fn file(bytes: Vec<u8>) -> WeightsFile {
         WeightsFile::from_bytes(std::path::Path::new("run/checkpoint.safetensors"), bytes).unwrap()
-    }
-
-    #[test]
-    fn the_gradient_of_a_call_is_that_of_its_loss() {
-        let at = |north_m: f64, east_m: f64| Position { north_m, east_m };
-        let truth = [at(3.0, 4.0), at(9.0, 3.0)];
-        let output = [0.1_f32, 0.3, 0.2, -0.1];
-        // From (1, 1), with the path at (0, 3): the way back is shared between two steps.
-        let wanted = Wanted::new(at(1.0, 1.0), &truth, at(0.0, 3.0), 2);
-        let loss = |output: &[f32]| wanted.loss(output, 20.0, 0.5, &mut [0.0; 4]);
-        // Wanted (2.5, 2) and (6.5, -2); given (2, 6) and (4, -2).
-        assert!((loss(&output) - 0.5 * (0.25 + 16.0 + 6.25)).abs() < 1e-5);
-        let mut gradient = [0.0; 4];
-        wanted.loss(&output, 20.0, 0.5, &mut gradient);
-        for index in 0..4 {
-            let (mut above, mut below) = (output, output);
-            above[index] += 1e-3;
-            below[index] -= 1e-3;
-            let numeric = (loss(&above) - loss(&below)) / f64::from(above[index] - below[index]);
-            assert!((numeric - f64::from(gradient[index])).abs() < 1e-2, "{index}: {numeric} {gradient:?}");
-        }
-    }
-
-    #[test]
-    fn a_path_that_need_not_come_back_wants_the_true_displacements() {
-        let at = |north_m: f64| Position { north_m, east_m: 0.0 };
-        let truth = [at(2.0), at(5.0)];
-        let wanted = Wanted::new(at(1.0), &truth, at(100.0), 0);
-        assert!(wanted.loss(&[1.0, 0.0, 3.0, 0.0], 1.0, 1.0, &mut [0.0; 4]) < 1e-12);
-        let back = Wanted::new(at(1.0), &truth, at(3.0), 1);
-        assert!(back.loss(&[-1.0, 0.0, 3.0, 0.0], 1.0, 1.0, &mut [0.0; 4]) < 1e-12);
     }
 
     #[test]
@@ -614,7 +463,7 @@ mod tests {
     #[test]
     fn training_learns_the_weave() {
         let stage = StageConfig { steps: 300, batch: 32, learning_rate: 5e-3, ..Default::default() };
-        let rollout = StageConfig { steps: 100, calls: 3, learning_rate: 2e-3, ..stage };
+        let rollout = StageConfig { steps: 100, calls: 3, loss: Loss::Path, learning_rate: 2e-3, ..stage };
         let mut config = config(1, vec![stage, rollout]);
         config.training.weight_average = 0.95;
         let mut trainer = trainer(&config);

@@ -128,7 +128,7 @@ fn examine(run: &Path, commit: Option<&str>) -> anyhow::Result<Kept> {
             "{}: key \"name\" is empty: name the forecaster",
             run.join(CONFIG).display()
         );
-        let (steps, last) = log.lines.last().map_or((0, 0.0), |line| (line.step, line.loss_m2));
+        let (steps, last) = log.lines.last().map_or((0, 0.0), |line| (line.step, line.loss_m));
         return Ok(Kept { run: run.to_owned(), name: log.name, steps, last, commits, file: LOG, origin });
     }
     bail!(

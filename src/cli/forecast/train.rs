@@ -61,7 +61,7 @@ const CONFIG: &str = "config.toml";
 const LOG: &str = "log.csv";
 const CHECKPOINT: &str = "checkpoint.safetensors";
 const MODEL: &str = "model.safetensors";
-const LOG_HEADER: &str = "step,loss_m2,learning_rate,gradient_norm";
+const LOG_HEADER: &str = "step,loss_m,learning_rate,gradient_norm";
 
 pub(super) fn run(args: &TrainArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let checkpoint = args.out.join(CHECKPOINT);
@@ -161,7 +161,7 @@ impl Run<'_> {
 struct Log {
     csv: BufWriter<File>,
     events: EventWriter<BufWriter<File>>,
-    loss_m2: f64,
+    loss_m: f64,
     gradient_norm: f64,
     last: Option<Update>,
     count: u64,
@@ -184,7 +184,7 @@ impl Log {
         Ok(Self {
             csv: BufWriter::new(csv),
             events: EventWriter::new(BufWriter::new(events), unix_s())?,
-            loss_m2: 0.0,
+            loss_m: 0.0,
             gradient_norm: 0.0,
             last: None,
             count: 0,
@@ -192,7 +192,7 @@ impl Log {
     }
 
     fn add(&mut self, update: Update) {
-        self.loss_m2 += update.loss_m2;
+        self.loss_m += update.loss_m;
         self.gradient_norm += update.gradient_norm;
         self.last = Some(update);
         self.count += 1;
@@ -202,16 +202,15 @@ impl Log {
     fn write(&mut self, bar: &ProgressBar) -> anyhow::Result<()> {
         let Some(update) = self.last.take() else { return Ok(()) };
         let count = self.count as f64;
-        let (loss_m2, gradient_norm) = (self.loss_m2 / count, self.gradient_norm / count);
+        let (loss_m, gradient_norm) = (self.loss_m / count, self.gradient_norm / count);
         let Update { step, learning_rate, .. } = update;
-        writeln!(self.csv, "{step},{loss_m2},{learning_rate},{gradient_norm}")?;
+        writeln!(self.csv, "{step},{loss_m},{learning_rate},{gradient_norm}")?;
         self.csv.flush()?;
-        let values =
-            [("loss_m2", loss_m2), ("learning_rate", learning_rate), ("gradient_norm", gradient_norm)];
+        let values = [("loss_m", loss_m), ("learning_rate", learning_rate), ("gradient_norm", gradient_norm)];
         self.events.scalars(unix_s(), step, &values)?;
         self.events.flush()?;
-        bar.set_message(format!("{loss_m2:.3} m2"));
-        (self.loss_m2, self.gradient_norm, self.count) = (0.0, 0.0, 0);
+        bar.set_message(format!("{loss_m:.3} m"));
+        (self.loss_m, self.gradient_norm, self.count) = (0.0, 0.0, 0);
         Ok(())
     }
 }
