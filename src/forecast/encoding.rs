@@ -63,16 +63,25 @@ impl Paths {
     /// `anchor[rows][2]`, north before east.
     pub fn encode(&self, scaling: Scaling, steps: usize, input: &mut [f32], anchor: &mut [f32]) {
         let first = self.len - 1 - steps;
-        for (index, row) in self.positions.chunks(self.stride).enumerate() {
-            let seen = &row[first..self.len];
-            for (step, pair) in seen.windows(2).enumerate() {
-                let way = (pair[1] - pair[0]) * (1.0 / scaling.step_m);
-                let at = (step * self.rows + index) * 2;
-                (input[at], input[at + 1]) = (way.north_m as f32, way.east_m as f32);
-            }
+        for (step, input) in input.chunks_mut(2 * self.rows.max(1)).take(steps).enumerate() {
+            self.encode_displacement(scaling, first + step, input);
+        }
+        self.encode_anchor(scaling, anchor);
+    }
+
+    /// Writes the displacements from position `step` to the next: `input[rows][2]`.
+    pub fn encode_displacement(&self, scaling: Scaling, step: usize, input: &mut [f32]) {
+        for (row, input) in self.positions.chunks(self.stride).zip(input.as_chunks_mut().0) {
+            let way = (row[step + 1] - row[step]) * (1.0 / scaling.step_m);
+            *input = [way.north_m as f32, way.east_m as f32];
+        }
+    }
+
+    /// Writes the present positions: `anchor[rows][2]`.
+    pub fn encode_anchor(&self, scaling: Scaling, anchor: &mut [f32]) {
+        for (row, anchor) in self.positions.chunks(self.stride).zip(anchor.as_chunks_mut().0) {
             let here = row[self.len - 1];
-            anchor[2 * index] = (here.north_m / scaling.anchor_m) as f32;
-            anchor[2 * index + 1] = (here.east_m / scaling.anchor_m) as f32;
+            *anchor = [(here.north_m / scaling.anchor_m) as f32, (here.east_m / scaling.anchor_m) as f32];
         }
     }
 

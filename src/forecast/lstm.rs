@@ -2,7 +2,7 @@
 
 use super::encoding::Paths;
 use super::linear::straight_on;
-use super::network::{Batch, NetworkState};
+use super::network::Rollout;
 use super::{Basis, ForecastError, Forecaster, Forecasts, Model, basis_of};
 use crate::geo::Position;
 use crate::nn::Compute;
@@ -16,9 +16,10 @@ pub struct LstmForecaster {
 }
 
 struct Buffers {
-    rows: usize,
-    state: NetworkState<f32>,
-    histories: Vec<f32>,
+    /// Most paths there is room for.
+    capacity: usize,
+    rollout: Rollout<f32>,
+    displacements: Vec<f32>,
     anchors: Vec<f32>,
 }
 
@@ -41,19 +42,23 @@ impl LstmForecaster {
         let (rows, steps) = (histories.len(), encoding.history_len - 1);
         let calls = horizon.div_ceil(encoding.outputs);
         let network = &self.model.network;
-        let buffers = self.buffers.take().filter(|buffers| buffers.rows == rows);
-        let buffers = self.buffers.insert(buffers.unwrap_or_else(|| Buffers {
-            rows,
-            state: network.state(rows),
-            histories: vec![0.0; steps * rows * 2],
-            anchors: vec![0.0; rows * 2],
-        }));
+        let buffers = self.buffers.take().filter(|buffers| buffers.capacity >= rows);
+        let Buffers { rollout, displacements, anchors, .. } =
+            self.buffers.insert(buffers.unwrap_or_else(|| Buffers {
+                capacity: rows,
+                rollout: network.rollout(rows),
+                displacements: vec![0.0; rows * 2],
+                anchors: vec![0.0; rows * 2],
+            }));
+        let (displacements, anchors) = (&mut displacements[..rows * 2], &mut anchors[..rows * 2]);
         self.paths.start(&encoding, histories.iter().copied(), calls);
-        for _ in 0..calls {
-            self.paths.encode(encoding.scaling, steps, &mut buffers.histories, &mut buffers.anchors);
-            let batch = Batch { histories: &buffers.histories, anchors: &buffers.anchors, rows };
-            let output = network.forward(&mut self.compute, batch, &mut buffers.state);
-            self.paths.extend(&encoding, output);
+        network.begin(&self.compute, calls, rows, rollout);
+        for step in 0..steps + calls.saturating_sub(1) * encoding.outputs {
+            self.paths.encode_displacement(encoding.scaling, step, displacements);
+            self.paths.encode_anchor(encoding.scaling, anchors);
+            if let Some(output) = network.take(&mut self.compute, displacements, anchors, rollout) {
+                self.paths.extend(&encoding, output);
+            }
         }
     }
 }

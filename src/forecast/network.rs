@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::nn::weights::{WeightsError, WeightsFile, WeightsWriter};
 use crate::nn::{
-    Activation, Buffer, Compute, Dense, Gradients, Layout, Lstm, LstmState, Parameters, Real,
+    Activation, Buffer, Compute, Dense, Gradients, Layout, Lstm, LstmState, LstmWindows, Parameters, Real,
     mean_squared_error,
 };
 
@@ -72,11 +72,24 @@ pub struct ForecastNetwork<T> {
 #[derive(Debug, Clone)]
 pub struct NetworkState<T> {
     lstm: LstmState<T>,
+    head: Head<T>,
+    d_joined: Buffer<T>,
+    d_outputs: Vec<Buffer<T>>,
+}
+
+/// Activations of what follows the LSTM.
+#[derive(Debug, Clone)]
+struct Head<T> {
     /// Last state and anchor, `[rows][hidden + 2]` or `[rows][hidden]`.
     joined: Buffer<T>,
     outputs: Vec<Buffer<T>>,
-    d_joined: Buffer<T>,
-    d_outputs: Vec<Buffer<T>>,
+}
+
+/// Buffers of a network that is called again and again on what it has predicted.
+#[derive(Debug, Clone)]
+pub struct Rollout<T> {
+    lstm: LstmWindows<T>,
+    head: Head<T>,
 }
 
 /// A batch: what a network reads.
@@ -169,15 +182,21 @@ impl<T: Real> ForecastNetwork<T> {
 
     /// Buffers for batches of up to `rows` rows.
     pub fn state(&self, rows: usize) -> NetworkState<T> {
-        let outputs = || self.linear.iter().map(|layer| Buffer::zeros(rows * layer.outputs())).collect();
         let joined = rows * self.linear[0].inputs();
         NetworkState {
             lstm: self.lstm.state(self.config.steps, rows),
-            joined: Buffer::zeros(joined),
-            outputs: outputs(),
+            head: self.head(rows),
             d_joined: Buffer::zeros(joined),
-            d_outputs: outputs(),
+            d_outputs: self.outputs(rows),
         }
+    }
+
+    fn outputs(&self, rows: usize) -> Vec<Buffer<T>> {
+        self.linear.iter().map(|layer| Buffer::zeros(rows * layer.outputs())).collect()
+    }
+
+    fn head(&self, rows: usize) -> Head<T> {
+        Head { joined: Buffer::zeros(rows * self.linear[0].inputs()), outputs: self.outputs(rows) }
     }
 
     /// The predictions for a batch, `[rows][outputs]`: displacement by displacement, north before east.
@@ -190,20 +209,56 @@ impl<T: Real> ForecastNetwork<T> {
         let Batch { histories, anchors, rows } = batch;
         let steps = histories.len() / (rows.max(1) * COORDINATES);
         self.lstm.forward(compute, &self.parameters, histories, steps, rows, None, &mut state.lstm);
-        let width = self.linear[0].inputs();
-        state.lstm.read_last(None, &mut state.joined, width);
+        state.lstm.read_last(None, &mut state.head.joined, self.linear[0].inputs());
+        self.head_forward(compute, anchors, rows, &mut state.head)
+    }
+
+    /// From the last hidden states in `head` to the predictions.
+    fn head_forward<'s>(
+        &self,
+        compute: &mut Compute,
+        anchors: &[T],
+        rows: usize,
+        head: &'s mut Head<T>,
+    ) -> &'s [T] {
         if self.config.anchored {
             let anchors = anchors.as_chunks::<COORDINATES>().0;
-            for (joined, anchor) in state.joined.chunks_mut(width).zip(&anchors[..rows]) {
+            for (joined, anchor) in head.joined.chunks_mut(self.linear[0].inputs()).zip(&anchors[..rows]) {
                 joined[self.config.hidden..].copy_from_slice(anchor);
             }
         }
         for (index, layer) in self.linear.iter().enumerate() {
-            let (before, from_here) = state.outputs.split_at_mut(index);
-            let input = before.last().unwrap_or(&state.joined);
+            let (before, from_here) = head.outputs.split_at_mut(index);
+            let input = before.last().unwrap_or(&head.joined);
             layer.forward(compute, &self.parameters, input, rows, &mut from_here[0]);
         }
-        &state.outputs[self.linear.len() - 1][..rows * self.config.outputs()]
+        &head.outputs[self.linear.len() - 1][..rows * self.config.outputs()]
+    }
+
+    /// Buffers for the rollout of up to `rows` paths.
+    pub fn rollout(&self, rows: usize) -> Rollout<T> {
+        let NetworkConfig { steps, predicted, .. } = self.config;
+        Rollout { lstm: self.lstm.windows(steps, predicted, rows), head: self.head(rows) }
+    }
+
+    /// Starts a rollout of `calls` calls over `rows` paths.
+    pub fn begin(&self, compute: &Compute, calls: usize, rows: usize, rollout: &mut Rollout<T>) {
+        self.lstm.begin(compute, &self.parameters, (calls, rows), &mut rollout.lstm);
+    }
+
+    /// Takes the next displacement of every path, `[rows][2]`, an observed one or one that it predicted; the
+    /// predictions of the call whose history this completes, as [`forward`](Self::forward) would give them.
+    pub fn take<'s>(
+        &self,
+        compute: &mut Compute,
+        displacements: &[T],
+        anchors: &[T],
+        rollout: &'s mut Rollout<T>,
+    ) -> Option<&'s [T]> {
+        self.lstm.slide(compute, &self.parameters, displacements, &mut rollout.lstm);
+        let rows = displacements.len() / COORDINATES;
+        let complete = rollout.lstm.read_complete(&mut rollout.head.joined, self.linear[0].inputs());
+        complete.then(|| self.head_forward(compute, anchors, rows, &mut rollout.head))
     }
 
     /// The mean squared error of a batch against `targets[rows][outputs]`; its gradients are added.
@@ -218,7 +273,7 @@ impl<T: Real> ForecastNetwork<T> {
         self.forward(compute, batch, state);
         let last = self.linear.len() - 1;
         let count = batch.rows * self.config.outputs();
-        let output = &state.outputs[last][..count];
+        let output = &state.head.outputs[last][..count];
         let loss = mean_squared_error(output, &targets[..count], &mut state.d_outputs[last][..count]);
         self.backward(compute, batch, state, None, gradients);
         loss
@@ -229,7 +284,7 @@ impl<T: Real> ForecastNetwork<T> {
     pub fn loss_buffers<'s>(&self, rows: usize, state: &'s mut NetworkState<T>) -> (&'s [T], &'s mut [T]) {
         let last = self.linear.len() - 1;
         let count = rows * self.config.outputs();
-        (&state.outputs[last][..count], &mut state.d_outputs[last][..count])
+        (&state.head.outputs[last][..count], &mut state.d_outputs[last][..count])
     }
 
     /// Adds the gradients of a loss of the caller's own, whose derivative stands in
@@ -244,14 +299,14 @@ impl<T: Real> ForecastNetwork<T> {
     ) {
         let Batch { histories, rows, .. } = batch;
         for (index, layer) in self.linear.iter().enumerate().rev() {
-            let input = if index == 0 { &state.joined } else { &state.outputs[index - 1] };
+            let input = if index == 0 { &state.head.joined } else { &state.head.outputs[index - 1] };
             let (before, from_here) = state.d_outputs.split_at_mut(index);
             let d_input = before.last_mut().unwrap_or(&mut state.d_joined);
             layer.backward(
                 compute,
                 &self.parameters,
                 input,
-                &state.outputs[index],
+                &state.head.outputs[index],
                 rows,
                 &mut from_here[0],
                 Some(d_input),

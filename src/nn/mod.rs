@@ -45,7 +45,7 @@ pub use compute::Compute;
 pub use dense::Dense;
 pub use layout::{Layout, Tensor};
 pub use loss::mean_squared_error;
-pub use lstm::{Lstm, LstmState};
+pub use lstm::{Lstm, LstmState, LstmWindows};
 pub use parameters::{Gradients, Parameters};
 pub use real::Real;
 pub use simd::Isa;

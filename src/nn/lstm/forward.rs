@@ -25,17 +25,19 @@ pub(super) struct Pass<'a, T> {
 }
 
 impl<T: Real> Pass<'_, T> {
-    /// Writes `b + W x` to the gates of all steps: one product over rows x steps.
-    pub unsafe fn project(&self, steps: usize, part: Range<usize>) {
+    /// Writes `b + W x` to the gates of some steps: one product over rows x steps.
+    pub unsafe fn project(&self, steps: Range<usize>, part: Range<usize>) {
         let (layer, blocks) = (self.layer, self.layer.blocks());
+        let a_strides = Strides::row_major(self.rows, layer.inputs);
+        let c_strides = Strides::blocked(self.rows, GATES * blocks);
         let product = Product {
-            a: self.input.at(part.start * layer.inputs),
-            a_strides: Strides::row_major(self.rows, layer.inputs),
+            a: self.input.at(steps.start * a_strides.step + part.start * layer.inputs),
+            a_strides,
             b: self.input_weight.at(0),
             panel_rows: layer.inputs,
-            c: self.gates.pointer(part.start * PANEL),
-            c_strides: Strides::blocked(self.rows, GATES * blocks),
-            steps,
+            c: self.gates.pointer(steps.start * c_strides.step + part.start * PANEL),
+            c_strides,
+            steps: steps.len(),
             rows: part.len(),
             inner: layer.inputs,
             columns: GATES * blocks * PANEL,
@@ -46,22 +48,22 @@ impl<T: Real> Pass<'_, T> {
         unsafe { product.run(self.isa) }
     }
 
-    /// Adds `W h` of the step before, where there is one, and computes the new states, block by block while the
+    /// Adds `W h` of the `previous` step, where there is one, and computes the new states, block by block while the
     /// block's four gates are in the first-level cache.
-    pub unsafe fn step(&self, step: usize, part: Range<usize>) {
+    pub unsafe fn step(&self, step: usize, previous: Option<usize>, part: Range<usize>) {
         let (layer, blocks, rows) = (self.layer, self.layer.blocks(), self.rows);
         let gate_strides = Strides::blocked(rows, GATES * blocks);
         let state_strides = Strides::blocked(rows, blocks);
         let first = part.start * PANEL;
         for block in 0..blocks {
-            let state = step * state_strides.step + block * state_strides.panel + first;
-            let previous = state.wrapping_sub(state_strides.step);
+            let state_of = |step| step * state_strides.step + block * state_strides.panel + first;
+            let state = state_of(step);
             let gates = step * gate_strides.step + block * gate_strides.panel + first;
             let gate_stride = blocks * gate_strides.panel;
-            if step > 0 {
+            if let Some(previous) = previous {
                 for gate in 0..GATES {
                     let product = Product {
-                        a: self.hidden.pointer((step - 1) * state_strides.step + first).cast_const(),
+                        a: self.hidden.pointer(previous * state_strides.step + first).cast_const(),
                         a_strides: state_strides,
                         b: self.hidden_weight.at((gate * blocks + block) * layer.hidden * PANEL),
                         panel_rows: layer.hidden,
@@ -81,7 +83,7 @@ impl<T: Real> Pass<'_, T> {
             let work = GatesForward {
                 gates: self.gates.pointer(gates),
                 gate_stride,
-                previous_cell: (step > 0).then(|| self.cell.pointer(previous).cast_const()),
+                previous_cell: previous.map(|step| self.cell.pointer(state_of(step)).cast_const()),
                 cell: self.cell.pointer(state),
                 tanh_cell: self.tanh_cell.pointer(state),
                 hidden: self.hidden.pointer(state),

@@ -5,6 +5,7 @@ mod forward;
 mod gates;
 #[cfg(test)]
 mod tests;
+mod windows;
 
 use crate::nn::dense::Source;
 use crate::nn::elementwise::Accumulate;
@@ -14,6 +15,7 @@ use crate::nn::{Buffer, Compute, Gradients, Layout, Parameters, Real};
 use backward::PassBack;
 use forward::Pass;
 use gates::GATES;
+pub use windows::LstmWindows;
 
 /// One LSTM layer, PyTorch's `LSTM` with one layer and zero initial state: gates in the order input, forget,
 /// candidate, output, and two biases, which it sums.
@@ -158,14 +160,36 @@ impl Lstm {
         }
         let steps = lengths.map_or(steps, |lengths| lengths[..rows].iter().copied().max().unwrap_or(0));
         (state.steps, state.rows) = (steps, rows);
+        self.sum_biases(compute, parameters, state);
+        let pass = self.pass(compute, parameters, input, state);
+        compute.split(rows, ROW_GRAIN, self.operations(steps, rows), &|part| {
+            // SAFETY: sizes checked above; parts are disjoint rows of every buffer that is written.
+            unsafe {
+                pass.project(0..steps, part.clone());
+                for step in 0..steps {
+                    pass.step(step, step.checked_sub(1), part.clone());
+                }
+            }
+        });
+    }
+
+    fn sum_biases<T: Real>(&self, compute: &Compute, parameters: &Parameters<T>, state: &mut LstmState<T>) {
         state.bias.copy_from_slice(parameters.at(self.input_bias));
         let sum = Accumulate { target: &mut state.bias, source: parameters.at(self.hidden_bias) };
         T::dispatch(compute.isa(), sum);
+    }
 
-        let isa = compute.isa();
-        let pass = Pass {
+    /// A pass over the rows of `state`, whose biases are summed.
+    fn pass<'a, T: Real>(
+        &'a self,
+        compute: &Compute,
+        parameters: &'a Parameters<T>,
+        input: &'a [T],
+        state: &'a mut LstmState<T>,
+    ) -> Pass<'a, T> {
+        Pass {
             layer: self,
-            isa,
+            isa: compute.isa(),
             input: Source(input.as_ptr()),
             bias: Source(state.bias.as_ptr()),
             input_weight: Source(parameters.at(self.input_weight).as_ptr()),
@@ -174,17 +198,8 @@ impl Lstm {
             cell: Shared::new(&mut state.cell),
             tanh_cell: Shared::new(&mut state.tanh_cell),
             hidden: Shared::new(&mut state.hidden_states),
-            rows,
-        };
-        compute.split(rows, ROW_GRAIN, self.operations(steps, rows), &|part| {
-            // SAFETY: sizes checked above; parts are disjoint rows of every buffer that is written.
-            unsafe {
-                pass.project(steps, part.clone());
-                for step in 0..steps {
-                    pass.step(step, part.clone());
-                }
-            }
-        });
+            rows: state.rows,
+        }
     }
 
     /// Carries gradients back through time, after [`forward`](Self::forward) with the same arguments.
