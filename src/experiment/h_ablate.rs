@@ -1,7 +1,7 @@
 //! `h_ablate`: final test return over the length of the history, four agents, two motions (paper,
 //! section "Experiments").
 
-use super::curves::{AgentKind, Curve, Group, Waters, commits, thousands};
+use super::curves::{AgentKind, Curve, Group, Waters, commits, counted, thousands};
 use super::learning::{OPEN_WATER, style};
 use super::product::{DataTable, Drawing, Product, data_row};
 use crate::report::figure::{Figure, LegendPlace, Line, Panel, Stroke, Whisker};
@@ -118,6 +118,7 @@ fn panel(waters: Waters, columns: &[&Column<'_>], step: u64, data: &mut DataTabl
         whiskers,
         close_up: true,
         legend: LegendPlace::Emptiest,
+        size_px: Some((520, 460)),
         ..Panel::default()
     }
 }
@@ -126,7 +127,7 @@ fn panel(waters: Waters, columns: &[&Column<'_>], step: u64, data: &mut DataTabl
 fn seeds(columns: &[&Column<'_>]) -> String {
     let counts = || columns.iter().map(|column| column.group.curves.len());
     match (counts().min().unwrap_or(0), counts().max().unwrap_or(0)) {
-        (least, most) if least == most => format!("{least} seed(s) each"),
+        (least, most) if least == most => format!("{} each", counted(least, "seed")),
         (least, most) => format!("{least} to {most} seeds"),
     }
 }

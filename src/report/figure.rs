@@ -248,7 +248,7 @@ mod tests {
         let svg =
             Figure::single(Panel { bands: vec![band], whiskers: vec![whisker], ..panel }).to_svg().unwrap();
         assert_eq!(svg.matches("<polygon").count(), 1);
-        assert!(svg.contains("\n-20.0\n") && svg.contains("\n20.0\n"), "the axis reaches the interval");
+        assert!(svg.contains("\n-20\n") && svg.contains("\n20\n"), "the axis reaches the interval");
     }
 
     #[test]

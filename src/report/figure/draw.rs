@@ -6,7 +6,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
-use super::{Failure, LegendPlace, Line, Panel, Stroke};
+use super::{Failure, LegendPlace, Line, Panel, Stroke, Whisker};
 
 const FONT: (&str, u32) = ("sans-serif", 14);
 const TITLE_FONT: (&str, u32) = ("sans-serif", 17);
@@ -19,7 +19,9 @@ const DASH_PX: (u32, u32) = (7, 4);
 const CAP_PX: i32 = 3;
 const LEGEND_PX: i32 = 18;
 /// Part of either axis that a legend in a corner takes.
-const CORNER: f64 = 0.4;
+const CORNER: f64 = 0.3;
+/// Points that stand for an interval where a legend looks for room.
+const BAR_POINTS: u32 = 8;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, Y>>;
@@ -41,6 +43,8 @@ impl Panel {
                 .map_err(failure)?;
             self.fill(chart, SeriesLabelPosition::UpperRight)
         } else {
+            // Marks and intervals at the ends need room beside them.
+            let x = if self.whiskers.is_empty() { x } else { x.widened() };
             let (x, y) = match (self.equal_scales, self.close_up) {
                 (true, _) => equal(x, y, size_px),
                 (false, true) => (x, y.widened()),
@@ -62,7 +66,12 @@ impl Panel {
     /// The corner that the fewest points lie in; of equals the first in reading order.
     fn emptiest_corner(&self, x: Range, y: Range) -> SeriesLabelPosition {
         let part = |value: f64, range: Range| (value - range.low) / (range.high - range.low);
-        let points = || self.points().map(|(at_x, at_y)| (part(at_x, x), part(at_y, y)));
+        let along = |bar: &Whisker| {
+            let (x, low, high) = (bar.x, bar.low, bar.high);
+            (0..=BAR_POINTS).map(move |k| (x, low + (high - low) * f64::from(k) / f64::from(BAR_POINTS)))
+        };
+        let all = || self.points().chain(self.whiskers.iter().flat_map(along));
+        let points = || all().map(|(at_x, at_y)| (part(at_x, x), part(at_y, y)));
         let count = |is_in: fn((f64, f64)) -> bool| points().filter(|&point| is_in(point)).count();
         let corners = [
             (SeriesLabelPosition::UpperLeft, count(|(x, y)| x < CORNER && y > 1.0 - CORNER)),
@@ -90,6 +99,8 @@ impl Panel {
             .y_desc(&self.y_label)
             .x_labels(6)
             .y_labels(6)
+            .x_label_formatter(&tick)
+            .y_label_formatter(&tick)
             .label_style(FONT)
             .axis_desc_style(FONT)
             .draw()
@@ -178,6 +189,14 @@ where
         }
     });
     Ok(())
+}
+
+/// A number at an axis, without digits that say nothing.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature is that of plotters")]
+fn tick(value: &f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    // Adding 0 takes the sign from a negative zero.
+    format!("{}", rounded + 0.0)
 }
 
 pub(super) fn failure(error: impl std::fmt::Display) -> Failure {
