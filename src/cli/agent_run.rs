@@ -154,13 +154,17 @@ fn load_traffic(
         TracksPart::Training => split.train,
         TracksPart::HeldOut => split.test,
     };
-    let CachedStarts { starts, remark, .. } =
-        cache::encounter_starts()?.find(&tracks, &config.coastal.head_on);
+    Ok(Arc::new(traffic_on(tracks, &config.coastal).context("key \"tracks\"")?))
+}
+
+/// The traffic on these tracks; says how many encounters they offer.
+pub fn traffic_on(tracks: Vec<Track>, config: &CoastalConfig) -> anyhow::Result<RecordedTraffic> {
+    let CachedStarts { starts, remark, .. } = cache::encounter_starts()?.find(&tracks, &config.head_on);
     if let Some(remark) = remark {
         eprintln!("note: {remark}");
     }
     eprintln!("{}", account(&starts, &tracks));
-    Ok(Arc::new(RecordedTraffic::with_starts(tracks, starts, &config.coastal).context("key \"tracks\"")?))
+    Ok(RecordedTraffic::with_starts(tracks, starts, config)?)
 }
 
 /// How many starts the tracks offer, and which tracks offer none.

@@ -12,6 +12,7 @@ use clap::{Parser, Subcommand};
 mod agent_run;
 mod agent_training;
 pub mod ais;
+mod benchmark;
 mod cache;
 pub mod cpa;
 pub mod env;
@@ -79,6 +80,8 @@ subcommands! {
     Export(export),
     /// Make the paper's figures, each with one command
     Experiment(experiment),
+    /// Compare policies on the same encounters
+    Benchmark(benchmark),
     /// Standard manoeuvres of a ship with real dynamics
     Vessel(vessel),
     /// Closest point of approach of two vessels: closed form, sampled and refined

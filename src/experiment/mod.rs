@@ -15,6 +15,7 @@ mod field_record;
 pub mod forecasts;
 pub mod h_ablate;
 mod learning;
+pub mod noise;
 pub mod noise_analysis;
 pub mod prediction;
 pub mod prediction_rmse;

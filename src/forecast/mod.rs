@@ -41,7 +41,7 @@ pub use evaluate::{
 pub use linear::LinearForecaster;
 pub use lstm::LstmForecaster;
 pub use model::{DataConfig, Model, ModelConfig, ModelError, ModelKind};
-pub use segment::{Quantiles, Segment, rmse_m};
+pub use segment::{Quantiles, Segment, quantile, rmse_m};
 pub use split::{Split, SplitConfig, SplitError, split_by_time};
 pub use training::{StageConfig, Trainer, TrainingConfig, TrainingConfigError, Update};
 pub use unrolled::Loss;

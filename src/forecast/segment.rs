@@ -81,20 +81,25 @@ pub struct Quantiles {
 }
 
 impl Quantiles {
-    /// Of the values given, linearly interpolated between order statistics; nothing of none.
+    /// Of the values given; nothing of none.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        let at = |probability: f64| {
-            let rank = probability * last as f64;
-            let below = rank as usize;
-            let above = (below + 1).min(last);
-            sorted[below] + (sorted[above] - sorted[below]) * (rank - below as f64)
-        };
-        Some(Self { q25: at(0.25), q50: at(0.5), q75: at(0.75), q90: at(0.9) })
+        let at = |probability| quantile(&sorted, probability);
+        Some(Self { q25: at(0.25)?, q50: at(0.5)?, q75: at(0.75)?, q90: at(0.9)? })
     }
+}
+
+/// A quantile of values in ascending order, linearly interpolated between order statistics; nothing of
+/// none.
+#[must_use]
+pub fn quantile(sorted: &[f64], probability: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let rank = probability.clamp(0.0, 1.0) * last as f64;
+    let below = rank as usize;
+    let above = (below + 1).min(last);
+    Some(sorted[below] + (sorted[above] - sorted[below]) * (rank - below as f64))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 pub mod episode_files;
 pub mod event_file;
 pub mod figure;
+pub mod gallery;
 pub mod map;
 pub mod replay;
 

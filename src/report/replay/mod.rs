@@ -46,8 +46,20 @@ fn page(episode: &Episode) -> serde_json::Result<String> {
     ))
 }
 
+/// The page without an episode: whoever has one puts its data in the place of `{{episode}}`.
+pub(super) fn frame() -> String {
+    let script = SCRIPT.join("\n");
+    let parts = [
+        ("title", "searoom"),
+        ("style", STYLE.trim_end()),
+        ("script", script.trim_end()),
+        ("episode", "{{episode}}"),
+    ];
+    fill(PAGE, &parts)
+}
+
 /// Replaces each `{{name}}` of a template, in one pass: what was filled in is not looked at again.
-fn fill(template: &str, values: &[(&str, &str)]) -> String {
+pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = template;
     while let Some((before, after)) = rest.split_once("{{") {
@@ -59,13 +71,13 @@ fn fill(template: &str, values: &[(&str, &str)]) -> String {
     text + rest
 }
 
-fn text_in_html(text: &str) -> String {
+pub(super) fn text_in_html(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// JSON that no HTML parser takes for markup: `</script>` and `<!--` cannot occur without `<`, which
 /// JSON has only inside strings.
-fn json_in_html(json: &str) -> String {
+pub(super) fn json_in_html(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
@@ -185,7 +197,7 @@ impl PageTarget {
     }
 }
 
-fn encounter_words(encounter: Encounter) -> &'static str {
+pub(super) fn encounter_words(encounter: Encounter) -> &'static str {
     match encounter {
         Encounter::HeadOn => "head-on",
         Encounter::CrossingFromStarboard => "crossing from starboard",
