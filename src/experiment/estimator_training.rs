@@ -103,8 +103,8 @@ pub fn make(logs: &[TrainingLog]) -> Product {
     }
     let columns = panels.len().min(2);
     let caption = format!(
-        "Mean squared error of the displacements that a forecaster gives in training, averaged between two lines of the \
-         log; it steps where a stage begins that unrolls paths further. {}.",
+        "Training loss of a forecaster, averaged between two lines of the log: root mean square error of a displacement or, \
+         in the stages that learn whole paths, their mean error; it steps where such a stage begins. {}.",
         ran.join("; ")
     );
     Product { drawing: Drawing::Figure(Figure { panels, columns }), data, caption }
