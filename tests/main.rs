@@ -13,6 +13,7 @@ mod experiment;
 mod forecast;
 mod forecast_network;
 mod nn_allocation;
+mod noise;
 mod replay;
 mod rl;
 mod scenario;
