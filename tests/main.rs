@@ -12,6 +12,7 @@ mod cpa_cli;
 mod experiment;
 mod forecast;
 mod forecast_network;
+mod gallery;
 mod nn_allocation;
 mod noise;
 mod replay;
