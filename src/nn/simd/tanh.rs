@@ -16,7 +16,7 @@ pub fn rational<S: Simd<Scalar = f32>>(simd: S, a: S::Vector) -> S::Vector {
     let x = simd.max(simd.splat(-LIMIT), simd.min(simd.splat(LIMIT), a));
     let square = simd.mul(x, x);
     let numerator = simd.mul(x, polynomial(simd, square, NUMERATOR));
-    simd.div(numerator, polynomial(simd, square, DENOMINATOR))
+    simd.mul(numerator, simd.reciprocal(polynomial(simd, square, DENOMINATOR)))
 }
 
 #[inline(always)]
