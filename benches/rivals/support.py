@@ -40,9 +40,9 @@ def median_seconds(work, seconds=2.0):
 def report(subject, who, threads, variants, **more):
     """Times every variant, `{name: function that measures it}`, and prints the fastest. A variant that cannot run
     here, such as one that wants a compiler, is told of and must not hide the others. With BENCH_VARIANTS, a list of
-    names such as `eager,unroll=4`, only variants that contain one of them run."""
+    names such as `eager,unroll=4`, only variants that contain one of them run, or all where none does."""
     wanted = os.environ.get("BENCH_VARIANTS", "").split(",")
-    variants = {name: measure for name, measure in variants.items() if any(part in name for part in wanted)}
+    variants = {name: run for name, run in variants.items() if any(part in name for part in wanted)} or variants
     results = {}
     for name, measure in variants.items():
         try:
