@@ -50,13 +50,17 @@ impl EnvMaker {
         Ok(Self { config: config.clone(), model, traffic, table: None })
     }
 
-    /// Makes all forecasts that episodes can ask for beforehand, where they do not depend on the episode: worth
-    /// its time for thousands of episodes.
-    pub fn share_forecasts(&mut self) -> anyhow::Result<()> {
+    /// Makes all forecasts that episodes can ask for beforehand, where they do not depend on the episode and so many
+    /// `decisions` would ask for more of them than there are. The bits of an episode are the same either way.
+    pub fn share_forecasts(&mut self, decisions: u64) -> anyhow::Result<()> {
+        let config = &self.config.coastal;
         if let (Some(model), Some(traffic)) = (&self.model, &self.traffic)
-            && self.config.coastal.forecasts_depend_on_tracks_alone()
+            && config.forecasts_depend_on_tracks_alone()
         {
-            self.table = Some(Arc::new(forecast_table(model, traffic, &self.config.coastal)?));
+            let asked = decisions / config.forecast_every_decisions.max(1) as u64;
+            if asked >= traffic.forecast_samples(config).len() as u64 {
+                self.table = Some(Arc::new(forecast_table(model, traffic, config)?));
+            }
         }
         Ok(())
     }

@@ -71,7 +71,7 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     args.pace.check()?;
     let (folder, config) = resolve(&args)?;
     let mut envs = EnvMaker::new(&config, TracksPart::Training)?;
-    envs.share_forecasts()?;
+    envs.share_forecasts(config.steps)?;
     let compute = Compute::new(args.threads.max(1));
     let watcher = Terminal { bar: progress::steps(config.steps, "training"), interrupted: interrupted()? };
     let started = Instant::now();

@@ -149,6 +149,24 @@ mod tests {
         }
     }
 
+    /// A run may take its forecasts one by one or from large batches, on any number of threads.
+    #[test]
+    fn a_forecast_has_the_same_bits_alone_and_in_a_batch() {
+        for kind in [ModelKind::OpenWater, ModelKind::Coastal] {
+            let mut forecaster = forecaster(kind);
+            let length = forecaster.history_len();
+            let ways: Vec<Vec<Position>> = (0..67).map(|k| way(length, 0.01 * f64::from(k))).collect();
+            let histories: Vec<&[Position]> = ways.iter().map(Vec::as_slice).collect();
+            let mut many = LstmForecaster::new(forecaster.model().clone(), 2);
+            let (mut together, mut alone) = (Forecasts::new(), Forecasts::new());
+            many.forecast(&histories, 30, &mut together).unwrap();
+            for index in [0, 1, 31, 32, 66] {
+                forecaster.forecast(&histories[index..=index], 30, &mut alone).unwrap();
+                assert_eq!(alone.path(0), together.path(index), "{index}");
+            }
+        }
+    }
+
     #[test]
     fn a_history_without_velocity_is_an_error() {
         let error = forecaster(ModelKind::OpenWater)

@@ -27,6 +27,21 @@ pub struct SampleTable {
     bases: Vec<Basis>,
 }
 
+/// `there` as a table keeps it, seen from the sample at `here`: to a millimetre within some ten kilometres.
+#[must_use]
+pub fn as_kept(here: Position, there: Position) -> Position {
+    from_offset(here, offset(here, there))
+}
+
+fn offset(here: Position, there: Position) -> [f32; 2] {
+    let way = there - here;
+    [way.north_m as f32, way.east_m as f32]
+}
+
+fn from_offset(here: Position, way: [f32; 2]) -> Position {
+    here + Displacement { north_m: f64::from(way[0]), east_m: f64::from(way[1]) }
+}
+
 /// Histories that are forecast at once.
 const BATCH: usize = 64;
 
@@ -58,10 +73,7 @@ impl SampleTable {
             forecaster.forecast(&histories, steps, &mut forecasts)?;
             for (path, &(track, index)) in batch.iter().enumerate() {
                 let here = tracks[track].positions[index];
-                for &position in forecasts.path(path) {
-                    let way = position - here;
-                    table.offsets.extend([way.north_m as f32, way.east_m as f32]);
-                }
+                table.offsets.extend(forecasts.path(path).iter().flat_map(|&there| offset(here, there)));
                 table.bases.push(forecasts.basis(path));
             }
             on_progress(batch.len());

@@ -213,7 +213,7 @@ impl Shared {
             return Ok(Arc::clone(envs));
         }
         let mut made = EnvMaker::new(config, TracksPart::Training)?;
-        made.share_forecasts()?;
+        made.share_forecasts(config.steps)?;
         let made = Arc::new(made);
         envs.insert(key, Arc::clone(&made));
         Ok(made)

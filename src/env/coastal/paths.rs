@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::forecast::sample_table::SampleTable;
+use crate::forecast::sample_table::{SampleTable, as_kept};
 use crate::forecast::{Basis, ForecastError, Forecaster, Forecasts};
 use crate::geo::Position;
 
@@ -60,10 +60,14 @@ impl PathSource for LivePaths {
             return Some(path.clone());
         }
         self.forecaster.forecast(&[history], steps, &mut self.forecasts).ok()?;
-        let path = Path { positions: self.forecasts.path(0).into(), basis: self.forecasts.basis(0) };
-        if let Some(known) = &mut self.known {
-            known.insert(moment.sample, path.clone());
-        }
+        let (forecast, basis) = (self.forecasts.path(0), self.forecasts.basis(0));
+        let Some(known) = &mut self.known else {
+            return Some(Path { positions: forecast.into(), basis });
+        };
+        // The very bits of a table, so that a run may take either.
+        let here = *history.last()?;
+        let path = Path { positions: forecast.iter().map(|&there| as_kept(here, there)).collect(), basis };
+        known.insert(moment.sample, path.clone());
         Some(path)
     }
 }
