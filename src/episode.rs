@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::angle::Nautical;
 use crate::cpa::{Cpa, linear};
-use crate::encounter::{Encounter, EncounterConfig, Vantage, classify};
+use crate::encounter::{
+    self, ComplianceConfig, Encounter, EncounterConfig, EncounterReport, PairMoment, Vantage, classify,
+};
 use crate::geo::{Geodetic, Position, Velocity};
 use crate::world::{self, PairReport, VesselBody};
 
@@ -194,6 +196,25 @@ pub struct TargetSummary {
     pub circle_contacts: usize,
 }
 
+/// How well own ship kept to the collision regulations in an episode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compliance {
+    /// Its encounters, by target ship and then by time.
+    pub encounters: Vec<TargetEncounter>,
+    /// The mean score of the encounters, 0 to 1; nothing where there was none.
+    pub score: Option<f64>,
+}
+
+/// An encounter with a target ship.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TargetEncounter {
+    /// Name of the target ship.
+    pub target: String,
+    /// What it was and how own ship did.
+    #[serde(flatten)]
+    pub report: EncounterReport,
+}
+
 impl Episode {
     /// Time of the last step, in seconds after the start.
     #[must_use]
@@ -228,6 +249,27 @@ impl Episode {
             return Vec::new();
         }
         (1..self.vessels.len()).map(|vessel| self.summary(vessel)).collect()
+    }
+
+    /// Own ship's encounters under the collision regulations and how well it kept to them; the `Default`s of
+    /// both configurations are documented ones.
+    #[must_use]
+    pub fn compliance(&self, encounters: &EncounterConfig, config: &ComplianceConfig) -> Compliance {
+        let of_vessel = |vessel: usize| {
+            let seen = |state: &VesselStep| (state.position, state.velocity);
+            let moments: Vec<_> = self
+                .steps
+                .iter()
+                .map(|step| PairMoment { own: seen(&step.vessels[0]), target: seen(&step.vessels[vessel]) })
+                .collect();
+            encounter::assess(&moments, self.dt_s, self.contact_distance_m(vessel), encounters, config)
+                .into_iter()
+                .map(move |report| TargetEncounter { target: self.vessels[vessel].name.clone(), report })
+        };
+        let encounters: Vec<_> = (1..self.vessels.len()).flat_map(of_vessel).collect();
+        let sum: f64 = encounters.iter().map(|encounter| encounter.report.score).sum();
+        let score = (!encounters.is_empty()).then(|| sum / encounters.len() as f64);
+        Compliance { encounters, score }
     }
 
     fn summary(&self, vessel: usize) -> TargetSummary {

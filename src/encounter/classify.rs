@@ -32,12 +32,35 @@ pub enum Role {
 }
 
 impl Encounter {
+    /// As tables and pages write it.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::HeadOn => "head-on",
+            Self::CrossingFromStarboard => "crossing from starboard",
+            Self::CrossingFromPort => "crossing from port",
+            Self::Overtaking => "overtaking",
+            Self::Overtaken => "overtaken",
+        }
+    }
+
     /// Own ship's role. In a head-on encounter both vessels give way.
     #[must_use]
     pub fn role(self) -> Role {
         match self {
             Self::HeadOn | Self::CrossingFromStarboard | Self::Overtaking => Role::GiveWay,
             Self::CrossingFromPort | Self::Overtaken => Role::StandOn,
+        }
+    }
+}
+
+impl Role {
+    /// As tables and pages write it.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::GiveWay => "give way",
+            Self::StandOn => "stand on",
         }
     }
 }

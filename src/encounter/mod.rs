@@ -6,9 +6,11 @@
 //! key of [`EncounterConfig`].
 
 mod classify;
+mod compliance;
 mod tracker;
 
 pub use classify::{Encounter, Role, Vantage, classify};
+pub use compliance::{ComplianceConfig, ComplianceParts, EncounterReport, PairMoment, assess};
 pub use tracker::{EncounterTracker, Risk};
 
 use serde::{Deserialize, Serialize};

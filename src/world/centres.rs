@@ -4,14 +4,14 @@ use nalgebra::Vector2;
 
 /// A least distance and the fraction of the step, in `[0, 1]`, at which it is reached first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closest {
+pub(crate) struct Closest {
     pub distance_m: f64,
     pub fraction: f64,
 }
 
 /// The second centre as seen from the first, from the beginning of a step to its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Approach {
+pub(crate) struct Approach {
     pub before: Vector2<f64>,
     pub after: Vector2<f64>,
 }

@@ -32,7 +32,7 @@ pub use bodies::Overlap;
 pub use hull::{Bow, Hull, HullError, HullPoint};
 
 use bodies::Bodies;
-use centres::Approach;
+pub(crate) use centres::Approach;
 use hulls::{HullMotion, HullPair, HullSweep};
 use minkowski::Separation;
 

@@ -188,7 +188,7 @@ impl Gallery {
         });
         let vessels = vessels.collect();
         let targets = episode.summaries().into_iter().map(|summary| SceneTarget {
-            encounter: summary.encounter.map(|encounter| self.text(replay::encounter_words(encounter))),
+            encounter: summary.encounter.map(|encounter| self.text(encounter.words())),
             dcpa_m: rounded(summary.start_cpa.distance_m, 100.0),
             tcpa_s: rounded(summary.start_cpa.time_s, 100.0),
             way: Way::of(episode, summary.vessel),

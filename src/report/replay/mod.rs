@@ -183,7 +183,7 @@ impl PageTarget {
         Self {
             vessel: summary.vessel,
             name: summary.name,
-            encounter: summary.encounter.map(encounter_words),
+            encounter: summary.encounter.map(Encounter::words),
             start_dcpa_m: summary.start_cpa.distance_m,
             start_tcpa_s: summary.start_cpa.time_s,
             closest_centre_m: summary.closest_centre_m,
@@ -194,16 +194,6 @@ impl PageTarget {
             first_hull_contact_s: summary.first_hull_contact_s,
             distance_m: pairs.map(|pair| round(pair.centre_distance_m, 100.0)).collect(),
         }
-    }
-}
-
-pub(super) fn encounter_words(encounter: Encounter) -> &'static str {
-    match encounter {
-        Encounter::HeadOn => "head-on",
-        Encounter::CrossingFromStarboard => "crossing from starboard",
-        Encounter::CrossingFromPort => "crossing from port",
-        Encounter::Overtaking => "overtaking",
-        Encounter::Overtaken => "overtaken",
     }
 }
 
