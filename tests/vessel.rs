@@ -130,6 +130,8 @@ fn tankers_head_on(policy: &mut dyn Policy) -> (f64, f64) {
                     heading: state.heading,
                     ordered_heading: own.ordered_heading(),
                     max_turn_rad: own.max_turn_rad(),
+                    planned_speed_mps: 7.0,
+                    max_speed_change_mps: 0.0,
                     history: &[],
                 },
                 route: &route,

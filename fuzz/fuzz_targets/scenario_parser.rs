@@ -5,13 +5,14 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use searoom::scenario::{ScenarioFile, TargetMotion};
+use searoom::scenario::{ForecasterChoice, ScenarioFile, TargetMotion};
 
 fuzz_target!(|text: &str| {
     let Ok(file) = ScenarioFile::parse(text, Path::new("fuzz.toml")) else { return };
-    // Recorded tracks are read from wherever the text says: not from here.
+    // Recorded tracks and weights are read from wherever the text says: not from here.
     let recorded = file.scenario.targets.iter().any(|target| matches!(target.motion, TargetMotion::Recorded(_)));
-    if !recorded {
+    let learned = matches!(file.scenario.forecaster, Some(ForecasterChoice::Model(_)));
+    if !recorded && !learned {
         let _ = file.set_up();
     }
 });

@@ -1,14 +1,33 @@
 //! Policies by what a command line calls them: a name, a run's folder or an agent's file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 
 use super::agent_run::load_forecaster;
 use crate::agent::TrainedAgent;
+use crate::config;
 use crate::forecast::{Forecaster, LstmForecaster};
 use crate::geo::Geodetic;
-use crate::policy::{self, Policy, TrainedPolicy};
+use crate::policy::{self, Policy, PolicyConfigs, TrainedPolicy};
+
+/// Options of every command that runs policies.
+#[derive(Debug, clap::Args)]
+pub(super) struct PolicyArgs {
+    /// TOML file with settings of policies: one table per policy, named like it; docs/encounters.md tells more
+    #[arg(long, value_name = "FILE")]
+    policy_config: Option<PathBuf>,
+}
+
+impl PolicyArgs {
+    /// The settings; the defaults where no file is named.
+    pub fn load(&self) -> anyhow::Result<PolicyConfigs> {
+        let Some(file) = &self.policy_config else { return Ok(PolicyConfigs::default()) };
+        let configs: PolicyConfigs = config::load(file)?;
+        configs.check().map_err(|(key, message)| anyhow!("{}: key \"{key}\": {message}", file.display()))?;
+        Ok(configs)
+    }
+}
 
 /// What a policy steers in, as far as a trained agent has to know.
 pub(super) struct Waters {
@@ -19,8 +38,12 @@ pub(super) struct Waters {
 }
 
 /// The policy, and a remark on how it is used where there is one to make.
-pub(super) fn open(name: &str, waters: &Waters) -> anyhow::Result<(Box<dyn Policy>, Option<String>)> {
-    if let Some(policy) = policy::by_name(name) {
+pub(super) fn open(
+    name: &str,
+    waters: &Waters,
+    configs: &PolicyConfigs,
+) -> anyhow::Result<(Box<dyn Policy>, Option<String>)> {
+    if let Some(policy) = configs.policy(name) {
         return Ok((policy, None));
     }
     let path = Path::new(name);

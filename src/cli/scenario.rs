@@ -9,12 +9,13 @@ use serde::Serialize;
 
 mod exchange;
 
-use super::policies::{self, Waters};
+use super::policies::{self, PolicyArgs, Waters};
 use super::table::table;
-use crate::episode::{Episode, TargetSummary};
+use crate::encounter::{ComplianceConfig, EncounterConfig};
+use crate::episode::{Compliance, Episode, TargetEncounter, TargetSummary};
 use crate::geo::M_PER_NMI;
 use crate::report::{self, EpisodeFiles};
-use crate::scenario::{ScenarioFile, StagedEncounter};
+use crate::scenario::{ForecasterChoice, Scenario, ScenarioFile, StagedEncounter};
 
 /// The scenario commands.
 #[derive(Debug, clap::Args)]
@@ -42,7 +43,9 @@ enum Command {
         searoom scenario run scenarios/head_on.toml\n  \
         searoom scenario run scenarios/head_on.toml --policy rule-based --out out/rule-based\n  \
         searoom scenario run scenarios/head_on.toml --policy runs/coastal-lstm-sac-seed-1\n  \
-        searoom scenario run scenarios/head_on_curve.toml --seed 7 --json")]
+        searoom scenario run scenarios/head_on_curve.toml --seed 7 --json\n  \
+        searoom scenario run scenarios/head_on_curve.toml \\\n    \
+        --policy mpc --forecaster models/coastal-ny-lower-bay.safetensors")]
     Run(RunArgs),
     /// Make a scenario file of a traffic situation in DNV's maritime-schema JSON
     #[command(after_help = "What a scenario cannot hold is left out and listed.\n\nExamples:\n  \
@@ -61,10 +64,16 @@ enum Command {
 struct RunArgs {
     /// Scenario file
     file: PathBuf,
-    /// Who steers own ship, instead of the policy the file names: hold-course, rule-based, the folder of a run or the
-    /// file of an agent
+    /// Who steers own ship, instead of the policy the file names: hold-course, full-starboard, full-port, rule-based,
+    /// velocity-obstacle, potential-field, mpc, the folder of a run or the file of an agent
     #[arg(long)]
     policy: Option<String>,
+    /// What forecasts the target ships for the policy: "linear", or the weights of a trained forecaster;
+    /// without it, and where the file names none, their velocities are extrapolated
+    #[arg(long, value_name = "linear|FILE")]
+    forecaster: Option<String>,
+    #[command(flatten)]
+    settings: PolicyArgs,
     /// Seed of everything random, instead of the file's
     #[arg(long)]
     seed: Option<u64>,
@@ -166,20 +175,23 @@ fn described(staged: &StagedEncounter) -> String {
 
 fn run_scenario(args: &RunArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut file = ScenarioFile::load(&args.file)?;
+    if let Some(word) = &args.forecaster {
+        file.scenario.forecaster = Some(ForecasterChoice::of(word, Path::new("")));
+    }
     if let Some(seed) = args.seed {
         file.scenario.seed = seed;
     }
     let staged = file.set_up()?;
     let name = args.policy.as_deref().unwrap_or(&staged.scenario.policy);
     let waters = Waters { decision_s: staged.decision_s(), origin: staged.plane.map(|plane| plane.origin) };
-    let (mut policy, remark) = policies::open(name, &waters)?;
+    let (mut policy, remark) = policies::open(name, &waters, &args.settings.load()?)?;
     if let Some(remark) = remark {
         eprintln!("note: {remark}");
     }
     let episode = staged.run_under(policy.as_mut());
     let directory = args.out.clone().unwrap_or_else(|| Path::new("out").join(&file.scenario.name));
     let files = report::write_episode(&episode, &directory)?;
-    let outcome = Outcome::of(&episode, files);
+    let outcome = Outcome::of(&episode, &file.scenario, files);
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&outcome)?)?;
     } else {
@@ -193,10 +205,14 @@ fn run_scenario(args: &RunArgs, out: &mut dyn Write) -> anyhow::Result<()> {
 struct Outcome {
     scenario: String,
     policy: String,
+    /// What forecast the target ships; nothing where their velocities were extrapolated.
+    forecaster: Option<String>,
     seed: u64,
     duration_s: f64,
     contact: bool,
     targets: Vec<TargetOutcome>,
+    /// How own ship kept to the collision regulations.
+    compliance: Compliance,
     files: Files,
 }
 
@@ -222,21 +238,25 @@ struct Files {
 }
 
 impl Outcome {
-    fn of(episode: &Episode, files: EpisodeFiles) -> Self {
+    fn of(episode: &Episode, scenario: &Scenario, files: EpisodeFiles) -> Self {
         Self {
             scenario: episode.scenario.clone(),
             policy: episode.policy.clone(),
+            forecaster: scenario.forecaster.as_ref().map(ToString::to_string),
             seed: episode.seed,
             duration_s: episode.duration_s(),
             contact: episode.has_contact(),
             targets: episode.summaries().into_iter().map(TargetOutcome::from).collect(),
+            compliance: episode.compliance(&EncounterConfig::default(), &ComplianceConfig::default()),
             files: Files { csv: files.csv, jsonl: files.jsonl, html: files.html },
         }
     }
 
     fn print(&self, title: &str, out: &mut dyn Write) -> anyhow::Result<()> {
         writeln!(out, "{title}")?;
-        writeln!(out, "{}, seed {}, {:.0} s", self.policy, self.seed, self.duration_s)?;
+        let forecaster =
+            self.forecaster.as_ref().map_or_else(String::new, |name| format!(", forecasts: {name}"));
+        writeln!(out, "{}{forecaster}, seed {}, {:.0} s", self.policy, self.seed, self.duration_s)?;
         let headings =
             ["target", "DCPA at start", "TCPA at start", "closest", "at", "hulls", "contact of circles"];
         let mut rows = table(1, &headings);
@@ -252,8 +272,51 @@ impl Outcome {
             ]);
         }
         writeln!(out, "{rows}")?;
+        self.print_compliance(out)?;
         writeln!(out, "Wrote {} and {}", self.files.csv.display(), self.files.jsonl.display())?;
         writeln!(out, "Open {} in a browser to replay it", self.files.html.display())?;
+        Ok(())
+    }
+}
+
+impl Outcome {
+    fn print_compliance(&self, out: &mut dyn Write) -> anyhow::Result<()> {
+        let Some(score) = self.compliance.score else { return Ok(()) };
+        let headings = [
+            "encounter",
+            "role",
+            "from",
+            "until",
+            "action",
+            "distance",
+            "turn side",
+            "passing side",
+            "early",
+            "substantial",
+            "stand-on",
+            "score",
+        ];
+        let mut rows = table(2, &headings);
+        for TargetEncounter { target, report } in &self.compliance.encounters {
+            let part = |part: Option<f64>| part.map_or_else(|| "-".to_owned(), |part| format!("{part:.2}"));
+            let parts = &report.parts;
+            rows.add_row([
+                format!("{target}: {}", report.encounter.words()),
+                report.role.words().to_owned(),
+                format!("{:.0} s", report.begin_s),
+                format!("{:.0} s", report.end_s),
+                report.action_s.map_or_else(|| "none".to_owned(), |time_s| format!("{time_s:.0} s")),
+                part(Some(parts.passing_distance)),
+                part(parts.turn_side),
+                part(parts.passing_side),
+                part(parts.early),
+                part(parts.substantial),
+                part(parts.stand_on),
+                part(Some(report.score)),
+            ]);
+        }
+        writeln!(out, "{rows}")?;
+        writeln!(out, "Compliance with the collision regulations: {score:.2} of 1 (docs/encounters.md)")?;
         Ok(())
     }
 }

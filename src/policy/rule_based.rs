@@ -96,74 +96,24 @@ impl Policy for RuleBased {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{DT_S, Sailed, Ship, meeting, sail};
     use super::*;
     use crate::geo::Position;
-    use crate::policy::{HoldCourse, OwnShip, Route};
-    use crate::vessel::{Kinematic, KinematicConfig, Linear, Motion, Steered};
+    use crate::policy::HoldCourse;
+    use crate::vessel::{Linear, Motion};
 
-    const DT_S: f64 = 5.0;
-
-    /// Runs an encounter with linear target ships and returns the closest distance, the final
-    /// cross-track error and the largest one to port, all in metres.
-    fn run(policy: &mut dyn Policy, targets: &[Linear], steps: i64) -> (f64, f64, f64) {
-        let route = Route::straight(Position::ORIGIN, Nautical::NORTH);
-        let mut ship = Kinematic::new(KinematicConfig::default(), Position::ORIGIN, Nautical::NORTH, 8.0);
-        let (mut closest_m, mut to_port_m) = (f64::INFINITY, 0.0_f64);
-        policy.reset(0);
-        for step in 0..steps {
-            let state = ship.state();
-            if step % 4 == 0 {
-                let seen: Vec<_> = targets
-                    .iter()
-                    .map(|target| TargetShip {
-                        position: target.position(step),
-                        velocity: target.velocity(),
-                        history: &[],
-                        forecast: None,
-                        collision_distance_m: 300.0,
-                    })
-                    .collect();
-                let own = OwnShip {
-                    position: state.position,
-                    velocity: state.velocity,
-                    heading: state.heading,
-                    ordered_heading: ship.ordered_heading(),
-                    max_turn_rad: ship.max_turn_rad(),
-                    history: &[],
-                };
-                let time_s = step as f64 * DT_S;
-                ship.order(policy.decide(&Situation {
-                    time_s,
-                    dt_s: DT_S,
-                    decision_s: 20.0,
-                    own,
-                    route: &route,
-                    targets: &seen,
-                }));
-            }
-            ship.advance(DT_S);
-            let position = ship.state().position;
-            let nearest = targets.iter().map(|target| target.position(step + 1).distance_m(position));
-            closest_m = nearest.fold(closest_m, f64::min);
-            to_port_m = to_port_m.max(route.cross_track_error_m(position));
-        }
-        (closest_m, route.cross_track_error_m(ship.state().position), to_port_m)
-    }
-
-    fn head_on() -> Linear {
-        let velocity = Velocity::from_course(Nautical::from_degrees(180.0), 7.0);
-        Linear::new(Position { north_m: 240.0 * 15.0, east_m: 0.0 }, velocity, DT_S)
+    fn run(policy: &mut dyn Policy, target: &dyn Motion, steps: i64) -> Sailed {
+        sail(policy, Ship::default(), &[target], steps)
     }
 
     #[test]
     fn a_head_on_vessel_is_passed_clear_to_port_and_the_track_taken_up_again() {
-        let (held_m, ..) = run(&mut HoldCourse, &[head_on()], 60);
-        assert!(held_m < 50.0, "{held_m}");
+        let head_on = meeting(180.0, 7.0, 240.0);
+        assert!(run(&mut HoldCourse, &head_on, 60).closest_m < 50.0);
         let mut policy = RuleBased::new(RuleBasedConfig::default());
-        let (closest_m, _, to_port_m) = run(&mut policy, &[head_on()], 60);
-        assert!(closest_m > 350.0 && to_port_m < 1e-6, "{closest_m} {to_port_m}");
-        let (_, cross_track_m, _) = run(&mut policy, &[head_on()], 720);
-        assert!(cross_track_m.abs() < 20.0, "{cross_track_m}");
+        let sailed = run(&mut policy, &head_on, 60);
+        assert!(sailed.closest_m > 350.0 && sailed.most_to_port_m() < 1e-6, "{sailed:?}");
+        assert!(run(&mut policy, &head_on, 720).last_cross_track_m().abs() < 20.0);
     }
 
     #[test]
@@ -173,21 +123,16 @@ mod tests {
             Velocity { north_mps: 8.0, east_mps: 0.0 },
             DT_S,
         );
-        let mut policy = RuleBased::new(RuleBasedConfig::default());
-        let (closest_m, cross_track_m, to_port_m) = run(&mut policy, &[abeam], 200);
-        assert!((closest_m - 2000.0).abs() < 1e-6 && cross_track_m.abs() < 1e-6 && to_port_m < 1e-6);
+        let sailed = run(&mut RuleBased::new(RuleBasedConfig::default()), &abeam, 200);
+        assert!((sailed.closest_m - 2000.0).abs() < 1e-6);
+        assert!(sailed.last_cross_track_m().abs() < 1e-6 && sailed.most_to_port_m() < 1e-6);
     }
 
     #[test]
     fn a_crossing_vessel_from_starboard_is_passed_astern() {
-        let crossing = Linear::new(
-            Position { north_m: 240.0 * 8.0, east_m: 240.0 * 6.0 },
-            Velocity { north_mps: 0.0, east_mps: -6.0 },
-            DT_S,
-        );
+        let crossing = meeting(270.0, 6.0, 240.0);
         let mut policy = RuleBased::new(RuleBasedConfig::default());
-        let (held_m, ..) = run(&mut HoldCourse, &[crossing], 60);
-        let (closest_m, ..) = run(&mut policy, &[crossing], 80);
-        assert!(held_m < 50.0 && closest_m > 300.0, "{held_m} {closest_m}");
+        assert!(run(&mut HoldCourse, &crossing, 60).closest_m < 50.0);
+        assert!(run(&mut policy, &crossing, 80).closest_m > 300.0);
     }
 }

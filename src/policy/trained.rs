@@ -306,6 +306,8 @@ mod tests {
             heading: Nautical::NORTH,
             ordered_heading: Nautical::NORTH,
             max_turn_rad: 1.0_f64.to_radians(),
+            planned_speed_mps: 8.0,
+            max_speed_change_mps: 0.0,
             history: &[],
         }
     }

@@ -234,7 +234,7 @@ time = 2020-12-03T04:05:06Z
             (
                 "seed = 1",
                 "policy = \"hope\"",
-                "3: key \"policy\": \"hope\" is not known here: write \"hold-course\" or \"rule-based\"",
+                "3: key \"policy\": \"hope\" is not known here: write \"hold-course\", \"full-starboard\", \"full-port\", \"rule-based\", \"velocity-obstacle\", \"potential-field\" or \"mpc\"",
             ),
             (
                 "seed = 1",

@@ -9,6 +9,7 @@
 mod dynamics;
 pub mod encounter_starts;
 mod file;
+pub mod foresight;
 pub mod maritime_schema;
 mod model;
 mod moment;
@@ -23,6 +24,7 @@ mod tracks;
 mod write;
 
 pub use file::ScenarioFile;
+pub use foresight::ForecasterChoice;
 pub use model::*;
 pub use section::Fault;
 pub use setup::{PlacedTarget, StagedEncounter};

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::encounter_starts::HeadOnKind;
+use super::foresight::ForecasterChoice;
 use super::placement::{Bearing, WantedCpa};
 use crate::angle::Nautical;
 use crate::geo::{Geodetic, LocalPlane, MPS_PER_KNOT, Position};
@@ -43,6 +44,11 @@ pub struct Scenario {
     pub surroundings: Surroundings,
     /// Name of the policy that steers own ship, one of [`crate::policy::NAMES`].
     pub policy: String,
+    /// What forecasts the target ships for the policy; nothing leaves it to extrapolate their
+    /// velocities.
+    pub forecaster: Option<ForecasterChoice>,
+    /// How far ahead target ships are forecast, in seconds; beyond, they go straight on.
+    pub forecast_horizon_s: f64,
     /// Radius of the collision circle of every ship that has none of its own, in metres. Two ships
     /// are in contact where their circles touch.
     pub collision_radius_m: f64,
@@ -159,11 +165,13 @@ pub struct Steering {
     pub max_turn_deg: f64,
     /// Time between two decisions, in seconds.
     pub decision_interval_s: f64,
+    /// Largest change of speed per decision, in metres per second; 0 keeps the speed constant.
+    pub max_speed_change_mps: f64,
 }
 
 impl Default for Steering {
     fn default() -> Self {
-        Self { max_turn_deg: 2.4, decision_interval_s: 20.0 }
+        Self { max_turn_deg: 2.4, decision_interval_s: 20.0, max_speed_change_mps: 0.0 }
     }
 }
 
@@ -194,7 +202,7 @@ pub struct OwnShip {
     pub size: ShipSize,
     /// Radius of its collision circle, in metres, where it differs from the scenario's.
     pub collision_radius_m: Option<f64>,
-    /// Its speed, kept throughout, in metres per second.
+    /// Its speed at the start and the one it wants to make, in metres per second.
     pub speed_mps: f64,
     /// Where it starts and on which course.
     pub start: OwnStart,
@@ -511,6 +519,8 @@ impl Scenario {
             sensor_noise: SensorNoise::default(),
             surroundings: Surroundings::default(),
             policy: "hold-course".to_owned(),
+            forecaster: None,
+            forecast_horizon_s: 1000.0,
             collision_radius_m: 150.0,
             own_ship,
             targets: Vec::new(),
@@ -559,6 +569,12 @@ impl Scenario {
     #[must_use]
     pub fn policy(self, name: &str) -> Self {
         Self { policy: name.to_owned(), ..self }
+    }
+
+    /// Sets what forecasts the target ships for the policy.
+    #[must_use]
+    pub fn forecaster(self, forecaster: ForecasterChoice) -> Self {
+        Self { forecaster: Some(forecaster), ..self }
     }
 
     /// Sets the origin of the local plane.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::dynamics;
 use super::encounter_starts::HeadOnKind;
+use super::foresight::ForecasterChoice;
 use super::model::{
     Limits, OwnShip, OwnStart, Placement, PlannedWaypoint, Point, RecordedStart, RecordedVessel,
     RelativePlacement, RoutePoint, Scenario, SensorNoise, ShipSize, Steering, Target, TargetMotion,
@@ -24,6 +25,8 @@ const RANGE: Quantity = Quantity::length("range");
 const DCPA: Quantity = Quantity::length("dcpa");
 const TCPA: Quantity = Quantity::time("tcpa");
 const DURATION: Quantity = Quantity::time("duration");
+const FORECAST_HORIZON: Quantity = Quantity::time("forecast_horizon");
+const SPEED_CHANGE: Quantity = Quantity::speed("max_speed_change");
 const TIME_TO_COLLISION: Quantity = Quantity::time("time_to_collision");
 const POINT_KEYS: [&str; 4] = ["north_m", "east_m", "latitude_deg", "longitude_deg"];
 const BEARING_KEYS: [&str; 2] = ["bearing_deg", "relative_bearing_deg"];
@@ -40,6 +43,8 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
     let dt_s = root.number("dt_s", Takes::Positive)?;
     let seed = root.integer("seed")?;
     let policy = root.choice("policy", &policy::NAMES.map(|name| (name, name)))?;
+    let forecaster = root.text("forecaster")?.map(|word| ForecasterChoice::of(&word, directory));
+    let forecast_horizon_s = root.quantity(&FORECAST_HORIZON, Takes::Positive)?;
     let collision_radius_m = collision_radius(&mut root)?;
     let origin = root.section("origin")?.map(geodetic_section).transpose()?;
     let sensor_noise = root.section("sensor_noise")?.map(sensor_noise).transpose()?;
@@ -60,6 +65,8 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
         sensor_noise: sensor_noise.unwrap_or_default(),
         surroundings,
         policy: policy.map_or(blank.policy.clone(), str::to_owned),
+        forecaster,
+        forecast_horizon_s: forecast_horizon_s.unwrap_or(blank.forecast_horizon_s),
         collision_radius_m: collision_radius_m.unwrap_or(blank.collision_radius_m),
         targets,
         limits,
@@ -141,6 +148,9 @@ fn steering(mut section: Section<'_>, default: Steering) -> Result<Steering, Fau
         decision_interval_s: section
             .number("decision_interval_s", Takes::Positive)?
             .unwrap_or(default.decision_interval_s),
+        max_speed_change_mps: section
+            .quantity(&SPEED_CHANGE, Takes::NotNegative)?
+            .unwrap_or(default.max_speed_change_mps),
     };
     section.finish()?;
     Ok(steering)

@@ -1,5 +1,6 @@
 //! Running a situation: own ship under its policy, the targets on their way, everything recorded.
 
+use super::foresight::{Foresight, TargetForecasts};
 use super::model::Scenario;
 use super::setup::StagedEncounter;
 use super::streams::PositionSensor;
@@ -80,6 +81,7 @@ struct Voyage<'s> {
     sensors: Vec<PositionSensor>,
     /// Where its sensor placed each vessel, up to this step.
     observed: Vec<Vec<Position>>,
+    forecasts: Option<TargetForecasts>,
 }
 
 impl<'s> Voyage<'s> {
@@ -105,7 +107,10 @@ impl<'s> Voyage<'s> {
             .zip(&mut sensors)
             .map(|(past, sensor)| past.into_iter().map(|position| sensor.measure(position)).collect())
             .collect();
-        Self { staged, own, world, step: 0, states, sensors, observed }
+        let forecasts = staged.foresight.as_ref().map(Foresight::begin);
+        let mut voyage = Self { staged, own, world, step: 0, states, sensors, observed, forecasts };
+        voyage.look_ahead();
+        voyage
     }
 
     fn decide(&mut self, policy: &mut dyn Policy) {
@@ -115,7 +120,7 @@ impl<'s> Voyage<'s> {
                 position: self.sensed(vessel),
                 velocity: self.states[vessel].velocity,
                 history: &self.observed[vessel],
-                forecast: None,
+                forecast: self.forecast(vessel),
                 collision_distance_m: self.staged.own_body.collision_radius_m
                     + self.staged.targets[vessel - 1].body.collision_radius_m,
             })
@@ -126,6 +131,8 @@ impl<'s> Voyage<'s> {
             heading: self.states[0].heading,
             ordered_heading: self.own.ordered_heading(),
             max_turn_rad: self.own.max_turn_rad(),
+            planned_speed_mps: scenario.own_ship.speed_mps,
+            max_speed_change_mps: scenario.own_ship.steering.max_speed_change_mps,
             history: &self.observed[0],
         };
         let command = policy.decide(&Situation {
@@ -138,7 +145,26 @@ impl<'s> Voyage<'s> {
         });
         // A policy that leaves the speed alone leaves it to the plan.
         let planned_mps = self.staged.route.speed_mps(self.states[0].position);
-        self.own.order(Command { speed_mps: command.speed_mps.or(planned_mps), ..command });
+        let present_mps = self.states[0].velocity.speed_mps();
+        let change_mps = scenario.own_ship.steering.max_speed_change_mps;
+        let within_reach =
+            |speed_mps: f64| speed_mps.clamp(present_mps - change_mps, present_mps + change_mps);
+        let speed_mps = command.speed_mps.filter(|_| change_mps > 0.0).map(within_reach).or(planned_mps);
+        self.own.order(Command { speed_mps, ..command });
+    }
+
+    /// Forecasts the target ships at every time of a decision.
+    fn look_ahead(&mut self) {
+        let is_decision = self.step % self.staged.steps_per_decision() as i64 == 0;
+        if let Some(forecasts) = self.forecasts.as_mut().filter(|_| is_decision) {
+            forecasts.update(self.step, &self.observed[1..]);
+        }
+    }
+
+    /// Where a target ship is forecast from now on, the next position first; nothing for own ship and where
+    /// nothing is forecast.
+    fn forecast(&self, vessel: usize) -> Option<&[Position]> {
+        self.forecasts.as_ref()?.path(vessel.checked_sub(1)?, self.step)
     }
 
     /// Where its sensor places a vessel now.
@@ -157,6 +183,7 @@ impl<'s> Voyage<'s> {
         for ((sensor, state), observed) in self.sensors.iter_mut().zip(&self.states).zip(&mut self.observed) {
             observed.push(sensor.measure(state.position));
         }
+        self.look_ahead();
     }
 
     fn record(&self) -> Step {
@@ -166,7 +193,7 @@ impl<'s> Voyage<'s> {
             velocity: state.velocity,
             heading: state.heading,
             observed: noisy.then(|| self.sensed(vessel)),
-            ahead: Vec::new(),
+            ahead: self.forecast(vessel).map_or_else(Vec::new, <[Position]>::to_vec),
         });
         Step { vessels: vessels.collect(), pairs: self.world.reports().iter().map(PairStep::from).collect() }
     }

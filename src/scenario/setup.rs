@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::encounter_starts::{HeadOnConfig, head_on_pose};
 use super::file::ScenarioFile;
+use super::foresight::Foresight;
 use super::model::{OwnStart, Placement, Point, RelativePlacement, Scenario, ShipSize, Target, TargetMotion};
 use super::placement::{Kinematics, at_range_with_cpa, on_course_with_cpa, seen_at};
 use super::section::Fault;
@@ -32,6 +33,8 @@ pub struct StagedEncounter {
     pub own_body: VesselBody,
     /// The targets, in the order of the scenario.
     pub targets: Vec<PlacedTarget>,
+    /// What forecasts the targets for the policy, where the scenario asks for it.
+    pub foresight: Option<Foresight>,
 }
 
 /// A target ship with the motion it will make.
@@ -86,6 +89,8 @@ impl Scenario {
         self.check_dynamics()?;
         let mut library = TrackLibrary::default();
         let frame = Frame { plane: self.plane(&mut library)? };
+        let foresight = self.forecaster.as_ref().map(|choice| self.foresight(choice, frame.plane));
+        let foresight = foresight.transpose()?;
         let anchors = self
             .targets
             .iter()
@@ -122,6 +127,7 @@ impl Scenario {
             route,
             own_body,
             targets,
+            foresight,
         })
     }
 

@@ -95,6 +95,10 @@ impl Scenario {
             out.line(&format!("seed = {}", self.seed));
         }
         out.text("policy", &self.policy);
+        if let Some(forecaster) = &self.forecaster {
+            out.text("forecaster", &forecaster.to_string());
+            out.number("forecast_horizon_s", self.forecast_horizon_s);
+        }
         out.other("collision_radius_m", self.collision_radius_m, blank.collision_radius_m);
         if let Some(origin) = self.origin {
             out.table("[origin]");
@@ -153,11 +157,12 @@ impl Scenario {
             }
             out.number("time_to_collision_s", *time_to_collision_s);
         }
-        let Steering { max_turn_deg, decision_interval_s } = own.steering;
+        let Steering { max_turn_deg, decision_interval_s, max_speed_change_mps } = own.steering;
         if own.steering != Steering::suiting(own.dynamics.dynamics) {
             out.table("[own_ship.steering]");
             out.number("max_turn_deg", max_turn_deg);
             out.number("decision_interval_s", decision_interval_s);
+            out.number("max_speed_change_mps", max_speed_change_mps);
         }
     }
 }

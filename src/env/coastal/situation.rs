@@ -38,6 +38,8 @@ impl Coastal {
             heading: state.heading,
             ordered_heading: episode.own.ordered_heading(),
             max_turn_rad: episode.own.max_turn_rad(),
+            planned_speed_mps: self.config.head_on.own_speed_mps,
+            max_speed_change_mps: 0.0,
             history,
         }
     }

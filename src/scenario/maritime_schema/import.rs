@@ -39,7 +39,7 @@ impl Default for ImportOptions {
             policy: "rule-based".to_owned(),
             duration_s: None,
             default_duration_s: 1800.0,
-            steering: Steering { max_turn_deg: 10.0, decision_interval_s: 10.0 },
+            steering: Steering { max_turn_deg: 10.0, decision_interval_s: 10.0, ..Steering::default() },
             dynamics: Dynamics::default(),
             same_place_m: 1.0,
             course_tolerance_deg: 5.0,
