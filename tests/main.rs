@@ -5,6 +5,7 @@
 mod agents;
 mod ais;
 mod architecture;
+mod benchmark;
 mod browser;
 mod cli;
 mod cpa;

@@ -6,6 +6,7 @@ pub mod event_file;
 pub mod figure;
 pub mod gallery;
 pub mod map;
+pub mod pictures;
 pub mod replay;
 
 use std::path::{Path, PathBuf};

@@ -10,6 +10,7 @@ mod dynamics;
 pub mod encounter_starts;
 mod file;
 pub mod foresight;
+pub mod imazu;
 pub mod maritime_schema;
 mod model;
 mod moment;
