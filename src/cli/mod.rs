@@ -28,6 +28,7 @@ pub mod scenario;
 pub mod sweep;
 pub mod table;
 pub mod train;
+pub mod tune;
 pub mod vessel;
 
 #[derive(Debug, Parser)]
@@ -66,6 +67,8 @@ subcommands! {
     Ais(ais),
     /// List, check and run scripted encounters
     Scenario(scenario),
+    /// Search settings of a classical policy, on training seeds
+    Tune(tune),
     /// Train, measure and show forecasts of where vessels will go
     Forecast(forecast),
     /// The environments that agents are trained in: what each shows, takes and rewards

@@ -2,7 +2,8 @@
 //!
 //! An experiment takes what was trained, recorded or measured and makes a [`Product`]: a drawing, the
 //! numbers in it, and a caption that says what was run. None reads or writes files; `searoom experiment`
-//! does, and so does `searoom forecast plot` for the figures of forecasts.
+//! does, and so does `searoom forecast plot` for the figures of forecasts. [`tuning`] searches settings of
+//! the classical policies.
 
 mod agents_in_episode;
 pub mod architecture;
@@ -28,6 +29,7 @@ pub mod single_estimates;
 pub mod smoothing_distance;
 pub mod statistics;
 pub mod train_results;
+pub mod tuning;
 
 pub use agents_in_episode::make as agents_in_episode;
 pub use field_record::{FieldRecord, ObstacleTrace, Violation};

@@ -6,6 +6,7 @@
 //! ([`placement`]), and the starts of the paper's head-on encounters are found on recorded tracks
 //! ([`encounter_starts`]).
 
+pub mod drawn;
 mod dynamics;
 pub mod encounter_starts;
 mod file;
