@@ -154,7 +154,7 @@ fn an_interrupted_benchmark_goes_on_where_it_was() {
     let (straight, killed) = (folder(), folder());
     let arguments = [
         &BENCHMARK[..],
-        &["without.safetensors", "hold-course", "rule-based", "--episodes", "150", "--threads", "1"],
+        &["without.safetensors", "hold-course", "full-starboard", "--episodes", "150", "--threads", "1"],
     ]
     .concat();
     let expected = output(straight.path(), &arguments);
