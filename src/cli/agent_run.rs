@@ -12,10 +12,9 @@ use crate::agent::{RunConfig, TracksConfig};
 use crate::env::coastal::{Coastal, CoastalConfig, LivePaths, PathSource, RecordedTraffic, TablePaths};
 use crate::env::open_water::OpenWater;
 use crate::env::{Env, EnvName};
-use crate::forecast::sample_table::{SampleTable, TableFile};
+use crate::forecast::sample_table::{Sample, SampleTable, TableFile};
 use crate::forecast::{Forecaster, LstmForecaster, Model, split_by_time};
 use crate::geo::Geodetic;
-use crate::nn::weights::WeightsFile;
 use crate::scenario::encounter_starts::HeadOnStarts;
 use crate::scenario::starts_cache::CachedStarts;
 use crate::track::Track;
@@ -58,8 +57,9 @@ impl EnvMaker {
             && config.forecasts_depend_on_tracks_alone()
         {
             let asked = decisions / config.forecast_every_decisions.max(1) as u64;
-            if asked >= traffic.forecast_samples(config).len() as u64 {
-                self.table = Some(Arc::new(forecast_table(model, traffic, config)?));
+            let samples = traffic.forecast_samples(config);
+            if asked >= samples.len() as u64 {
+                self.table = Some(Arc::new(forecast_table(model, traffic, &samples, config.forecast_steps)?));
             }
         }
         Ok(())
@@ -107,9 +107,7 @@ impl EnvMaker {
 /// The forecaster behind the estimates of a run.
 pub fn load_forecaster(config: &RunConfig) -> anyhow::Result<Model> {
     let file = config.forecaster_file();
-    let model =
-        WeightsFile::open(&file).map_err(anyhow::Error::from).and_then(|file| Ok(Model::from_file(file)?));
-    model.with_context(|| {
+    Model::open(&file).with_context(|| {
         format!(
             "{}: no forecaster for the estimates; name one with `forecaster`, or train without estimates \
              (--no-estimates)",
@@ -118,23 +116,23 @@ pub fn load_forecaster(config: &RunConfig) -> anyhow::Result<Model> {
     })
 }
 
-/// The forecasts of every sample that episodes can ask for: those of an earlier command, or new ones on all cores.
+/// The forecasts at these samples: those of an earlier command, or new ones on all cores.
 fn forecast_table(
     model: &Model,
     traffic: &RecordedTraffic,
-    config: &CoastalConfig,
+    samples: &BTreeSet<Sample>,
+    steps: usize,
 ) -> anyhow::Result<SampleTable> {
-    let (samples, steps) = (traffic.forecast_samples(config), config.forecast_steps);
     let tracks: Vec<&Track> = traffic.tracks().collect();
     let bytes = model.to_file().to_bytes();
-    let file = cache::folder()?.map(|folder| TableFile::of(&folder, &bytes, &tracks, &samples, steps));
-    if let Some(table) = file.as_ref().and_then(|file| file.read(&samples, steps)) {
+    let file = cache::folder()?.map(|folder| TableFile::of(&folder, &bytes, &tracks, samples, steps));
+    if let Some(table) = file.as_ref().and_then(|file| file.read(samples, steps)) {
         return Ok(table);
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let forecaster = &mut LstmForecaster::new(model.clone(), threads);
     let bar = progress::steps(samples.len() as u64, "forecasts");
-    let table = SampleTable::forecast(forecaster, &tracks, &samples, steps, &mut |done| bar.inc(done as u64))
+    let table = SampleTable::forecast(forecaster, &tracks, samples, steps, &mut |done| bar.inc(done as u64))
         .context("key \"tracks\"")?;
     bar.finish_and_clear();
     if let Some(Err(error)) = file.map(|file| file.write(&table)) {

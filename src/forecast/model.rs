@@ -1,5 +1,7 @@
 //! A trained forecaster: which network, on what it was trained, and its weights, in one file.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -193,6 +195,15 @@ impl Model {
     #[must_use]
     pub fn to_file(&self) -> WeightsWriter {
         with_facts(self.network.writer(), &self.config, self.origin, self.steps)
+    }
+
+    /// The model in a file.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read, and as [`Self::from_file`].
+    pub fn open(path: &Path) -> Result<Self, ModelError> {
+        Self::from_file(WeightsFile::open(path)?)
     }
 
     /// Reads what [`Self::to_file`] wrote.

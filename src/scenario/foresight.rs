@@ -6,9 +6,8 @@ use std::sync::Arc;
 
 use super::model::Scenario;
 use super::section::Fault;
-use crate::forecast::{Forecaster, Forecasts, LinearForecaster, LstmForecaster, Model, ModelError};
+use crate::forecast::{Forecaster, Forecasts, LinearForecaster, LstmForecaster, Model};
 use crate::geo::{LocalPlane, Position};
-use crate::nn::weights::WeightsFile;
 
 /// The word for the linear forecaster, in scenario files and on the command line.
 const LINEAR: &str = "linear";
@@ -73,8 +72,7 @@ impl Scenario {
 
     fn model(&self, file: &Path, plane: Option<LocalPlane>) -> Result<Model, Fault> {
         let fault = |message: String, remedy: &str| Fault::new("forecaster", message, remedy);
-        let model = WeightsFile::open(file).map_err(ModelError::from).and_then(Model::from_file);
-        let model = model.map_err(|error| {
+        let model = Model::open(file).map_err(|error| {
             fault(error.to_string(), "write \"linear\" or a file of a trained forecaster")
         })?;
         let dt_s = model.config.dt_s();

@@ -15,7 +15,6 @@ use crate::forecast::{
     BestLinearForecaster, DataConfig, Errors, Evaluation, EvaluationConfig, Forecaster, LstmForecaster,
     Model, NoiseErrors, Quantiles, RouteErrors, evaluate, quantiles_of,
 };
-use crate::nn::weights::WeightsFile;
 
 /// Options of `searoom forecast evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -58,7 +57,7 @@ pub(super) fn run(args: &EvaluateArgs, out: &mut dyn Write) -> anyhow::Result<()
     if args.segments == 0 || args.horizon == Some(0) {
         bail!("--segments and --horizon have to be 1 or more");
     }
-    let model = Model::from_file(WeightsFile::open(&args.model)?)?;
+    let model = Model::open(&args.model)?;
     let horizon = args.horizon.unwrap_or(model.config.kind.horizon());
     let held_out = data::held_out(&model.config, &args.other, horizon, args.segments, args.seed)?;
     let mut forecaster = LstmForecaster::new(model, args.threads);

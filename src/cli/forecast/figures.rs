@@ -12,7 +12,6 @@ use crate::experiment::estimator_training::{self, TrainingLog};
 use crate::experiment::forecasts::Measured;
 use crate::experiment::{Product, prediction, prediction_rmse, quantile_forecast_vessel, single_estimates};
 use crate::forecast::{EvaluationConfig, LstmForecaster, Model, ModelKind, Segment};
-use crate::nn::weights::WeightsFile;
 
 /// What a figure of forecasts is made of.
 pub(in crate::cli) struct Shown<'a> {
@@ -89,7 +88,7 @@ impl Shown<'_> {
 
 /// A trained forecaster, to compute on one thread.
 pub(in crate::cli) fn forecaster(path: &Path) -> anyhow::Result<LstmForecaster> {
-    Ok(LstmForecaster::new(Model::from_file(WeightsFile::open(path)?)?, 1))
+    Ok(LstmForecaster::new(Model::open(path)?, 1))
 }
 
 /// Logs of trainings given as files, without more than they say.

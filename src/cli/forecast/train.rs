@@ -83,7 +83,7 @@ pub(super) fn run(args: &TrainArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     if let Some(start) = &config.training.start_from
         && !args.resume
     {
-        trainer.start_from(start, &Model::from_file(WeightsFile::open(Path::new(start))?)?)?;
+        trainer.start_from(start, &Model::open(Path::new(start))?)?;
     }
     if args.resume {
         trainer.resume(&config, WeightsFile::open(&checkpoint)?)?;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use crate::forecast::{Forecaster, LstmForecaster, Model};
-use crate::nn::weights::WeightsFile;
 
 /// The shipped forecaster of coastal waters.
 pub(super) const SHIPPED: &str = "models/coastal-ny-lower-bay.safetensors";
@@ -25,16 +24,13 @@ impl Forecasters {
         if let Some(number) = self.loaded.iter().position(|(loaded, _)| loaded == file) {
             return Ok(number);
         }
-        let model = WeightsFile::open(file)
-            .map_err(anyhow::Error::from)
-            .and_then(|weights| Ok(Model::from_file(weights)?))
-            .with_context(|| {
-                format!(
-                    "{}: no forecaster for the estimates; name one with --forecaster (paths are relative to the folder \
-                     you are in)",
-                    file.display()
-                )
-            })?;
+        let model = Model::open(file).with_context(|| {
+            format!(
+                "{}: no forecaster for the estimates; name one with --forecaster (paths are relative to the folder \
+                 you are in)",
+                file.display()
+            )
+        })?;
         self.loaded.push((file.to_owned(), model));
         Ok(self.loaded.len() - 1)
     }
