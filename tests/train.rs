@@ -84,7 +84,7 @@ fn a_run_trains_is_evaluated_and_is_not_overwritten() {
 #[test]
 fn a_killed_run_resumes_to_the_same_weights() {
     let (straight, killed) = (folder(), folder());
-    let arguments = [&TRAIN[..], &["--steps", "400"]].concat();
+    let arguments = [&TRAIN[..], &["--steps", "400", "--log-every", "30"]].concat();
     assert!(output(straight.path(), &arguments).status.success());
 
     let checkpoint = killed.path().join("run/checkpoint.safetensors");
@@ -95,9 +95,11 @@ fn a_killed_run_resumes_to_the_same_weights() {
     child.kill().unwrap();
     child.wait().unwrap();
 
-    let resumed = output(killed.path(), &["train", "--resume", "run", "--checkpoint-every", "20"]);
+    let resume = ["train", "--resume", "run", "--checkpoint-every", "20", "--log-every", "30"];
+    let resumed = output(killed.path(), &resume);
     assert!(resumed.status.success(), "{:?}", text(&resumed));
-    for file in ["run/checkpoint.safetensors", "run/policy.safetensors", "run/evaluations.csv"] {
+    for file in ["checkpoint.safetensors", "policy.safetensors", "evaluations.csv", "progress.csv"] {
+        let file = &format!("run/{file}");
         let [ours, theirs] = [&straight, &killed].map(|folder| fs::read(folder.path().join(file)).unwrap());
         assert!(ours == theirs, "{file} differs");
     }

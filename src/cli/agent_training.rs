@@ -3,7 +3,6 @@
 //! The folder holds the resolved configuration, the logs, the checkpoint and the best policy. A run goes on
 //! from its checkpoint with the bits it would have had; a lock keeps two processes from the same folder.
 
-use std::collections::VecDeque;
 use std::fs::{self, File, TryLockError};
 use std::io::BufWriter;
 use std::path::Path;
@@ -125,8 +124,6 @@ fn remove_leftovers(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Episodes that `rollout/ep_rew_mean` is taken over, as in Stable-Baselines3.
-const ROLLOUT_WINDOW: usize = 100;
 const PROGRESS: &str = "progress.csv";
 const PROGRESS_TAGS: [&str; 7] = [
     "rollout/ep_rew_mean",
@@ -148,7 +145,6 @@ struct Run<'a> {
     progress: CsvLog,
     evaluations: CsvLog,
     events: EventWriter<BufWriter<File>>,
-    episodes: VecDeque<FinishedEpisode>,
     best: Option<f64>,
 }
 
@@ -170,7 +166,6 @@ impl<'a> Run<'a> {
             best,
             events: open_events(folder, step)?,
             evaluation_env,
-            episodes: VecDeque::new(),
             checkpoints,
             folder,
             config,
@@ -179,12 +174,7 @@ impl<'a> Run<'a> {
 
     fn train(&mut self, trainer: &mut Trainer, pace: &Pace, watcher: &dyn Watcher) -> anyhow::Result<()> {
         while trainer.step() < self.config.steps && !watcher.wants_stop() {
-            if let Some(episode) = trainer.advance() {
-                if self.episodes.len() == ROLLOUT_WINDOW {
-                    self.episodes.pop_front();
-                }
-                self.episodes.push_back(episode);
-            }
+            trainer.advance();
             watcher.advanced();
             let step = trainer.step();
             if step.is_multiple_of(pace.log_every) {
@@ -204,8 +194,9 @@ impl<'a> Run<'a> {
 
     fn log_progress(&mut self, trainer: &mut Trainer) -> anyhow::Result<()> {
         let mean = |value: fn(&FinishedEpisode) -> f64| {
-            let count = self.episodes.len();
-            (count > 0).then(|| self.episodes.iter().map(value).sum::<f64>() / count as f64)
+            let episodes = trainer.recent_episodes();
+            let count = episodes.len();
+            (count > 0).then(|| episodes.iter().map(value).sum::<f64>() / count as f64)
         };
         let rollout = [mean(|episode| episode.total_reward), mean(|episode| episode.decisions as f64)];
         let updates = trainer.agent().updates() as f64;

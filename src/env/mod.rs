@@ -2,8 +2,9 @@
 //!
 //! `reset(seed)` starts an episode, `step(action)` makes one decision. Observations are f32 slices
 //! that the caller owns; everything before them is f64. A time limit *truncates* an episode, it never
-//! *terminates* it: an agent bootstraps through it. Equal seeds and equal actions give equal bits, so
-//! an episode under way can be restored from its seed and the actions taken since.
+//! *terminates* it: an agent bootstraps through it unless it is told not to. Equal seeds and equal
+//! actions give equal bits, so an episode under way can be restored from its seed and the actions taken
+//! since.
 
 use thiserror::Error;
 

@@ -4,6 +4,8 @@
 //! writes logs and keeps checkpoints. Equal seeds give equal bits, and a trainer restored from its
 //! [`TrainerState`] goes on with the bits it would have had.
 
+use std::collections::VecDeque;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -27,6 +29,9 @@ pub struct TrainerConfig {
     pub evaluate_every: u64,
     /// Episodes of one evaluation.
     pub evaluation_episodes: u64,
+    /// Whether what follows the last decision before the time limit counts, at the critic's own estimate. Without
+    /// it the limit ends an episode as a terminal state does.
+    pub bootstrap_at_time_limit: bool,
     /// The agent.
     pub agent: AgentConfig,
 }
@@ -39,13 +44,17 @@ impl Default for TrainerConfig {
             random_steps: 5000,
             evaluate_every: 10_000,
             evaluation_episodes: 10,
+            bootstrap_at_time_limit: true,
             agent: AgentConfig::default(),
         }
     }
 }
 
+/// Episodes that a trainer remembers the returns of, as many as Stable-Baselines3 averages over.
+const RECENT_EPISODES: usize = 100;
+
 /// An episode that has ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FinishedEpisode {
     /// Sum of its rewards.
     pub total_reward: f64,
@@ -91,6 +100,8 @@ pub struct TrainerState {
     pub episode_seed: u64,
     /// Actions taken in it, one after the other; replaying them restores the environment.
     pub episode_actions: Vec<f32>,
+    /// The latest episodes, the oldest first.
+    pub recent_episodes: VecDeque<FinishedEpisode>,
     /// State of the agent beside its networks.
     pub agent: AgentCounters,
 }
@@ -107,6 +118,7 @@ pub struct Trainer {
     episode_seed: u64,
     episode_actions: Vec<f32>,
     episode_reward: f64,
+    recent_episodes: VecDeque<FinishedEpisode>,
     observation: Vec<f32>,
     next_observation: Vec<f32>,
     action: Vec<f32>,
@@ -130,6 +142,7 @@ impl Trainer {
             episode_seed: 0,
             episode_actions: Vec::new(),
             episode_reward: 0.0,
+            recent_episodes: VecDeque::with_capacity(RECENT_EPISODES),
             observation: vec![0.0; observation_len],
             next_observation: vec![0.0; observation_len],
             action: vec![0.0; action_len],
@@ -164,6 +177,7 @@ impl Trainer {
             self.memory.push(&self.observation);
             std::mem::swap(&mut self.observation, &mut self.next_observation);
         }
+        self.recent_episodes = state.recent_episodes;
         self.rng = state.rng;
         true
     }
@@ -177,6 +191,7 @@ impl Trainer {
             rng: self.rng.clone(),
             episode_seed: self.episode_seed,
             episode_actions: self.episode_actions.clone(),
+            recent_episodes: self.recent_episodes.clone(),
             agent: self.agent.counters(),
         }
     }
@@ -209,6 +224,12 @@ impl Trainer {
         &self.scalars
     }
 
+    /// The latest 100 episodes, the oldest first.
+    #[must_use]
+    pub fn recent_episodes(&self) -> &VecDeque<FinishedEpisode> {
+        &self.recent_episodes
+    }
+
     /// One decision and, once the random ones are over, one update. Tells when an episode ended.
     ///
     /// # Panics
@@ -218,7 +239,8 @@ impl Trainer {
         self.choose_action();
         let outcome = self.env.step(&self.action, &mut self.next_observation);
         let outcome = outcome.unwrap_or_else(|error| panic!("a trainer's action was refused: {error}"));
-        self.replay.push(&self.action, outcome.reward as f32, outcome.terminated, &self.next_observation);
+        let ends_value = outcome.terminated || (outcome.truncated && !self.config.bootstrap_at_time_limit);
+        self.replay.push(&self.action, outcome.reward as f32, ends_value, &self.next_observation);
         self.episode_actions.extend_from_slice(&self.action);
         self.episode_reward += outcome.reward;
         self.memory.push(&self.observation);
@@ -230,6 +252,10 @@ impl Trainer {
         outcome.ends_episode().then(|| {
             let decisions = (self.episode_actions.len() / self.action.len()) as u64;
             let finished = FinishedEpisode { total_reward: self.episode_reward, decisions };
+            if self.recent_episodes.len() == RECENT_EPISODES {
+                self.recent_episodes.pop_front();
+            }
+            self.recent_episodes.push_back(finished);
             self.begin_episode();
             finished
         })

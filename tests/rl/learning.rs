@@ -1,9 +1,12 @@
 //! Both algorithms learn what they should be able to learn: a task that needs memory, and one that
 //! needs control.
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use searoom::env::Env;
 use searoom::nn::Compute;
 use searoom::rl::agent::Algorithm;
+use searoom::rl::replay::{Batch, ReplayShape};
 use searoom::rl::trainer::{Trainer, TrainerConfig};
 
 use super::tasks::{config, recall_cue, tracking};
@@ -50,6 +53,27 @@ fn td3_tracks_a_mark() {
 fn sac_tracks_a_mark() {
     let score = train(config(Algorithm::LstmSac), tracking, 6000);
     assert!(score > -3.0, "{score}");
+}
+
+/// The limit of 30 decisions ends nothing, unless the settings say that it does: then a share of 1 in 30.
+#[test]
+fn values_reach_beyond_the_time_limit_where_they_should() {
+    for (bootstraps, ends) in [(true, 0.0..=0.0), (false, 0.02..=0.05)] {
+        let settings = TrainerConfig { bootstrap_at_time_limit: bootstraps, ..config(Algorithm::LstmTd3) };
+        let mut trainer =
+            Trainer::new(TrainerConfig { random_steps: 300, ..settings }, tracking(), Compute::new(1));
+        for _ in 0..300 {
+            trainer.advance();
+        }
+        let mut batch =
+            Batch::new(&ReplayShape { observation_len: 2, action_len: 1, capacity: 300 }, 5000, 4);
+        assert!(trainer.replay().sample(&mut ChaCha8Rng::seed_from_u64(1), &mut batch));
+        let share = 1.0 - batch.continues.iter().sum::<f32>() / 5000.0;
+        assert!(
+            ends.contains(&share),
+            "bootstrap {bootstraps}: the value ends in {share} of all transitions"
+        );
+    }
 }
 
 #[test]
