@@ -119,11 +119,14 @@ pub struct RecordedConfig {
     pub least_noise_m: f64,
     /// Largest; drawn per segment, uniform in its logarithm.
     pub most_noise_m: f64,
+    /// Standard deviation of a shift of the whole segment on each axis, in metres: vessels of one route
+    /// do not sail in one another's wake.
+    pub shift_m: f64,
 }
 
 impl Default for RecordedConfig {
     fn default() -> Self {
-        Self { curve_share: 0.2, curve_deg: 15.0, least_noise_m: 0.2, most_noise_m: 20.0 }
+        Self { curve_share: 0.2, curve_deg: 15.0, least_noise_m: 0.2, most_noise_m: 20.0, shift_m: 0.0 }
     }
 }
 
@@ -164,6 +167,9 @@ pub enum DatasetError {
         /// The upper bound given.
         most: f64,
     },
+    /// The shift's spread is none.
+    #[error("`shift_m` is {0}; it has to be 0 or more, and finite")]
+    Shift(f64),
     /// Not a probability.
     #[error("`curve_share` is {0}; it has to lie between 0 and 1")]
     CurveShare(f64),
@@ -187,6 +193,9 @@ impl RecordedSegments {
         }
         if !(0.0..=1.0).contains(&config.curve_share) {
             return Err(DatasetError::CurveShare(config.curve_share));
+        }
+        if !(config.shift_m >= 0.0 && config.shift_m.is_finite()) {
+            return Err(DatasetError::Shift(config.shift_m));
         }
         let needed = history_len + horizon;
         let mut total = 0;
@@ -276,7 +285,10 @@ impl SegmentSource for RecordedSegments {
             self.place(rng.random_range(0..self.len()))
         };
         let mut segment = self.cut(track, first);
-        let RecordedConfig { least_noise_m, most_noise_m, .. } = self.config;
+        let RecordedConfig { least_noise_m, most_noise_m, shift_m, .. } = self.config;
+        if shift_m > 0.0 {
+            segment.shift(normal_displacement(shift_m, rng));
+        }
         let noise_m = least_noise_m * (most_noise_m / least_noise_m).powf(rng.random::<f64>());
         disturb(&mut segment.history, noise_m, rng);
         segment
@@ -286,10 +298,14 @@ impl SegmentSource for RecordedSegments {
 /// Adds independent noise of a standard deviation in metres to either axis of every position.
 pub fn disturb(positions: &mut [Position], noise_m: f64, rng: &mut impl Rng) {
     for position in positions {
-        let north_m = noise_m * rng.sample::<f64, _>(StandardNormal);
-        let east_m = noise_m * rng.sample::<f64, _>(StandardNormal);
-        *position += Displacement { north_m, east_m };
+        *position += normal_displacement(noise_m, rng);
     }
+}
+
+fn normal_displacement(sd_m: f64, rng: &mut impl Rng) -> Displacement {
+    let north_m = sd_m * rng.sample::<f64, _>(StandardNormal);
+    let east_m = sd_m * rng.sample::<f64, _>(StandardNormal);
+    Displacement { north_m, east_m }
 }
 
 #[cfg(test)]
@@ -363,9 +379,35 @@ mod tests {
         assert!(levels[50] < 0.6 && levels[450] > 6.0);
     }
 
+    /// History, present and future move by the same, which differs by segment and has the spread asked for.
+    #[test]
+    fn a_shift_moves_the_whole_segment() {
+        let mut segments = recorded(vec![track(1, 0, 200)]);
+        segments.config.shift_m = 100.0;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut squares = 0.0;
+        for _ in 0..500 {
+            let segment = segments.draw(&mut rng);
+            let first = (segment.start_unix_s.unwrap() / 5.0) as usize;
+            let truth = &segments.tracks[0].positions[first..];
+            let shift = segment.present - truth[9];
+            let off = |seen: &[Position], from: usize| {
+                let apart = seen.iter().zip(&truth[from..]).map(|(seen, at)| seen.distance_m(*at + shift));
+                apart.fold(0.0, f64::max)
+            };
+            assert!(off(&segment.future, 10) < 1e-9);
+            // What is left on the history is the noise.
+            assert!(off(&segment.history, 0) < 100.0);
+            squares += shift.north_m.powi(2) + shift.east_m.powi(2);
+        }
+        assert!(((squares / 1000.0).sqrt() - 100.0).abs() < 10.0);
+    }
+
     #[test]
     fn unusable_settings_are_refused() {
         let new = |config| RecordedSegments::new(vec![track(1, 0, 50)], 10, 20, config);
+        let shift = RecordedConfig { shift_m: -1.0, ..Default::default() };
+        assert_eq!(new(shift).unwrap_err(), DatasetError::Shift(-1.0));
         let noise = RecordedConfig { least_noise_m: 0.0, ..Default::default() };
         assert!(matches!(new(noise), Err(DatasetError::Noise { .. })));
         let share = RecordedConfig { curve_share: 1.5, ..Default::default() };

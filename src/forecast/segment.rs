@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::angle::Nautical;
-use crate::geo::Position;
+use crate::geo::{Displacement, Position};
 
 /// What a forecaster is shown of a path, and what it has to predict.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +38,13 @@ impl Segment {
     #[must_use]
     pub fn has_curve(&self, threshold_rad: f64) -> bool {
         self.course_at_end().turn_from(self.course_now()).abs() > threshold_rad
+    }
+
+    /// Moves the whole path.
+    pub fn shift(&mut self, by: Displacement) {
+        for position in self.history.iter_mut().chain([&mut self.present]).chain(&mut self.future) {
+            *position += by;
+        }
     }
 
     /// The route in the widest sense: the octants of the course now and at the end of the horizon, as
