@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use searoom::agent::TrainedAgent;
+
 fn searoom(arguments: &[&str]) -> Output {
     searoom_with_cache(Path::new("off"), arguments)
 }
@@ -139,4 +141,35 @@ fn environments_are_tabled() {
         "{coastal}"
     );
     assert_eq!(json(&["env", "open-water", "--json"])["observation_len"], 43);
+}
+
+/// A shipped agent opens, has its card, its forecaster, and a learning curve whose best evaluation chose its weights.
+#[test]
+fn shipped_agents_have_cards_and_curves() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let card = std::fs::read_to_string(root.join("models/agents/README.md")).unwrap();
+    let mut agents = 0;
+    for entry in std::fs::read_dir(root.join("models/agents")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "safetensors") {
+            continue;
+        }
+        agents += 1;
+        let agent = TrainedAgent::open(&path).unwrap();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        assert!(card.contains(&format!("`{name}`")), "{name} has no card");
+        assert!(!agent.config.estimates || root.join(agent.config.forecaster_file()).exists(), "{name}");
+        let curve = csv::Reader::from_path(root.join("results").join(name).join("evaluations.csv"));
+        let points: Vec<(u64, f64)> = curve
+            .unwrap()
+            .records()
+            .map(|record| record.unwrap())
+            .map(|record| (record[0].parse().unwrap(), record[1].parse().unwrap()))
+            .collect();
+        assert!(points.len() >= 15 && points.last().unwrap().0 >= 150_000, "{name}");
+        let best = points.iter().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
+        let chosen = points.iter().find(|point| point.1 == best).unwrap();
+        assert_eq!((agent.step, agent.mean_return), *chosen, "{name}");
+    }
+    assert!(agents >= 4);
 }
