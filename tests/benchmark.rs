@@ -2,6 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use searoom::agent::{RunConfig, TrainedAgent};
+use searoom::env::EnvName;
+use searoom::rl::agent::Agent;
 use serde_json::Value;
 
 use crate::cli::searoom;
@@ -30,9 +35,54 @@ fn every_case_runs_with_every_policy_and_holding_course_always_collides() {
         policies.iter().find(|row| row["policy"] == policy).unwrap()["contacts"].as_u64().unwrap()
     };
     assert_eq!(contacts("hold-course"), 22);
-    for policy in ["velocity-obstacle", "mpc"] {
-        assert!(contacts(policy) <= 5, "{policy}: {}", contacts(policy));
+    for policy in ["velocity-obstacle", "potential-field", "mpc"] {
+        assert_eq!(contacts(policy), 0, "{policy}");
     }
+}
+
+/// An agent of the coastal environment decides every 20 s, own ship of the problems takes orders every 10 s.
+#[test]
+fn an_agent_takes_part_at_its_own_pace_and_thresholds_come_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = RunConfig::of(EnvName::Coastal);
+    config.estimates = false;
+    config.trainer.agent.hidden = 8;
+    let save = |name: &str, config: &RunConfig| {
+        let rng = &mut ChaCha8Rng::seed_from_u64(4);
+        let agent = Agent::new(config.trainer.agent.clone(), config.observation_len(), 1, rng);
+        let config = config.clone();
+        let mut trained = TrainedAgent { name: name.into(), config, step: 0, mean_return: 0.0, agent };
+        let path = folder.path().join(format!("{name}.safetensors"));
+        trained.to_file().save(&path).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let some = save("some", &config);
+    let rules = folder.path().join("rules.toml");
+    let rules = rules.to_str().unwrap();
+    std::fs::write(rules, "[encounters]\nrisk_dcpa_m = 1\n").unwrap();
+    let options =
+        ["--json", "--cases", "1,2", "--policies", &format!("rule-based,{some}"), "--rules-config", rules];
+    let results: Value = serde_json::from_str(&imazu(&options)).unwrap();
+    let names: Vec<_> = results["episodes"].as_array().unwrap().iter().map(|row| &row["policy"]).collect();
+    assert_eq!(names, ["rule-based", "some", "rule-based", "some"]);
+
+    let refused = |options: &[&str]| {
+        let output = searoom(&[&["benchmark", "imazu", "--cases", "1"], options].concat());
+        assert!(!output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    config.coastal.head_on.decision_interval_s = 15.0;
+    config.coastal.decisions = 20;
+    let odd = save("odd", &config);
+    let told = refused(&["--policies", &odd]);
+    assert!(told.contains("decide every 15 s, which is no multiple of the 10 s"), "{told}");
+    let told = refused(&["--policies", "mpc,mpc"]);
+    assert!(told.contains("two called \"mpc\""), "{told}");
+    let told = refused(&["--policies", "hold-curse"]);
+    assert!(told.contains("\"hold-curse\" is no policy: write one of hold-course"), "{told}");
+    std::fs::write(rules, "[compliance]\nearly_s = 0\n").unwrap();
+    let told = refused(&["--rules-config", rules]);
+    assert!(told.contains("rules.toml: key \"compliance.early_s\": 0 is not possible here"), "{told}");
 }
 
 #[test]

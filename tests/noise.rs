@@ -130,6 +130,8 @@ fn one_thread_and_two_print_the_same() {
         assert_eq!(row["training_tracks"]["episodes"], 2);
         assert_eq!(row["unseen_vessels"]["episodes"], 2, "the late vessels are others than the early ones");
         assert_eq!(row["fallbacks"], 0);
+        let compliance = row["compliance"].as_f64().unwrap();
+        assert!((0.0..=1.0).contains(&compliance), "{row}");
     }
     let straight_on =
         rows.iter().filter(|row| row["policy"] == "hold-course" && row["scenario"] == "straight-on");

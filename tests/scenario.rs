@@ -215,7 +215,7 @@ fn a_traffic_situation_becomes_a_scenario_and_comes_back() {
     assert!(message.contains("faulty.json:2: key \"ownShip\": is a number, not an object"), "{message}");
 }
 
-/// The shipped encounter of ships with dynamics: holding course ends in contact, and the bow does not point
+/// The shipped encounter of ships with dynamics: holding course ends in contact, its own policy clears, and the bow does not point
 /// where the ship goes.
 #[test]
 fn tankers_in_a_current_are_sailed_by_their_dynamics() {
@@ -227,6 +227,8 @@ fn tankers_in_a_current_are_sailed_by_their_dynamics() {
         own.heading.turn_from(own.velocity.course()).to_degrees().abs()
     });
     assert!(drift_deg.fold(0.0, f64::max) > 3.0);
+    assert_eq!(ruled.policy, "rule-based");
+    assert!(!ruled.has_contact());
     file.scenario.policy = "hold-course".to_owned();
     assert!(file.set_up().unwrap().run().has_contact());
 }

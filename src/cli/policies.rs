@@ -7,6 +7,7 @@ use anyhow::{anyhow, bail};
 use super::agent_run::load_forecaster;
 use crate::agent::TrainedAgent;
 use crate::config;
+use crate::encounter::RulesConfig;
 use crate::forecast::{Forecaster, LstmForecaster};
 use crate::geo::Geodetic;
 use crate::policy::{self, Policy, PolicyConfigs, TrainedPolicy};
@@ -26,6 +27,25 @@ impl PolicyArgs {
         let configs: PolicyConfigs = config::load(file)?;
         configs.check().map_err(|(key, message)| anyhow!("{}: key \"{key}\": {message}", file.display()))?;
         Ok(configs)
+    }
+}
+
+/// Options of every benchmark that scores compliance with the collision regulations.
+#[derive(Debug, clap::Args)]
+pub(super) struct RulesArgs {
+    /// TOML file with the tables [encounters] and [compliance]: when an encounter begins, what counts as good conduct;
+    /// docs/encounters.md has the keys
+    #[arg(long, value_name = "FILE")]
+    rules_config: Option<PathBuf>,
+}
+
+impl RulesArgs {
+    /// The thresholds; the defaults where no file is named.
+    pub fn load(&self) -> anyhow::Result<RulesConfig> {
+        let Some(file) = &self.rules_config else { return Ok(RulesConfig::default()) };
+        let rules: RulesConfig = config::load(file)?;
+        rules.check().map_err(|(key, message)| anyhow!("{}: key \"{key}\": {message}", file.display()))?;
+        Ok(rules)
     }
 }
 

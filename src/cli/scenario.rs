@@ -11,7 +11,6 @@ mod exchange;
 
 use super::policies::{self, PolicyArgs, Waters};
 use super::table::table;
-use crate::encounter::{ComplianceConfig, EncounterConfig};
 use crate::episode::{Compliance, Episode, TargetEncounter, TargetSummary};
 use crate::geo::M_PER_NMI;
 use crate::report::{self, EpisodeFiles};
@@ -247,7 +246,7 @@ impl Outcome {
             duration_s: episode.duration_s(),
             contact: episode.has_contact(),
             targets: episode.summaries().into_iter().map(TargetOutcome::from).collect(),
-            compliance: episode.compliance(&EncounterConfig::default(), &ComplianceConfig::default()),
+            compliance: episode.compliance(&scenario.rules.encounters, &scenario.rules.compliance),
             files: Files { csv: files.csv, jsonl: files.jsonl, html: files.html },
         }
     }

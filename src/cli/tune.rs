@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use serde::Serialize;
 
 use super::policies::PolicyArgs;
@@ -56,6 +56,9 @@ pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
         config.candidates > 0 && config.encounters > 0 && config.rounds > 0,
         "candidates, encounters and rounds of a search are 1 or more"
     );
+    if let Err((key, message)) = config.rules.check() {
+        bail!("key \"rules.{key}\": {message}");
+    }
     ensure!(
         !config.drawn.steering.is_empty(),
         "key \"drawn.steering\" is empty: write one way to steer or more"

@@ -8,9 +8,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::EncounterConfig;
 use super::classify::{Encounter, Role, Vantage};
 use super::tracker::{EncounterTracker, Risk};
+use super::{BoundedKey, EncounterConfig};
 use crate::angle::Nautical;
 use crate::cpa::linear;
 use crate::geo::{Position, Velocity};
@@ -36,6 +36,21 @@ pub struct ComplianceConfig {
     /// A stand-on vessel may act for itself once the closest point of approach is this near (rule 17a ii),
     /// in seconds.
     pub stand_on_until_s: f64,
+}
+
+impl ComplianceConfig {
+    /// Every key, for readers and writers.
+    pub(crate) fn keys(&mut self) -> [BoundedKey<'_>; 7] {
+        [
+            ("safe_contacts", &mut self.safe_contacts, [1.01, 100.0]),
+            ("apparent_turn_deg", &mut self.apparent_turn_deg, [1.0, 180.0]),
+            ("apparent_slowing", &mut self.apparent_slowing, [0.01, 1.0]),
+            ("action_turn_deg", &mut self.action_turn_deg, [0.1, 180.0]),
+            ("action_slowing", &mut self.action_slowing, [0.01, 1.0]),
+            ("early_s", &mut self.early_s, [1.0, 1e5]),
+            ("stand_on_until_s", &mut self.stand_on_until_s, [0.0, 1e5]),
+        ]
+    }
 }
 
 impl Default for ComplianceConfig {

@@ -17,6 +17,37 @@ use serde::{Deserialize, Serialize};
 
 use crate::geo::M_PER_NMI;
 
+/// What counts as an encounter and what as good conduct in it: the tables `[encounters]` and `[compliance]`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RulesConfig {
+    /// When an encounter begins, of what kind it is and when it ends.
+    pub encounters: EncounterConfig,
+    /// How own ship's conduct is scored.
+    pub compliance: ComplianceConfig,
+}
+
+/// A key of a configuration, its value, and the least and greatest that can be worked with.
+pub(crate) type BoundedKey<'c> = (&'static str, &'c mut f64, [f64; 2]);
+
+impl RulesConfig {
+    /// Checks that every value can be worked with.
+    ///
+    /// # Errors
+    /// The first key whose value cannot be, and what to write instead.
+    pub fn check(mut self) -> Result<(), (String, String)> {
+        let encounters = self.encounters.keys().map(|key| ("encounters", key));
+        let compliance = self.compliance.keys().map(|key| ("compliance", key));
+        for (table, (key, value, [least, most])) in encounters.into_iter().chain(compliance) {
+            if !(least..=most).contains(value) {
+                let message = format!("{value} is not possible here: write a number from {least} to {most}");
+                return Err((format!("{table}.{key}"), message));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Thresholds of the classification. Angles are half-angles, in degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -38,6 +69,20 @@ pub struct EncounterConfig {
     pub past_and_clear_s: f64,
 }
 
+impl EncounterConfig {
+    /// Every key, for readers and writers.
+    pub(crate) fn keys(&mut self) -> [BoundedKey<'_>; 6] {
+        [
+            ("head_on_deg", &mut self.head_on_deg, [0.0, 90.0]),
+            ("abaft_deg", &mut self.abaft_deg, [90.0, 180.0]),
+            ("risk_dcpa_m", &mut self.risk_dcpa_m, [1.0, 1e5]),
+            ("risk_tcpa_s", &mut self.risk_tcpa_s, [1.0, 1e5]),
+            ("clear_dcpa_factor", &mut self.clear_dcpa_factor, [1.0, 100.0]),
+            ("past_and_clear_s", &mut self.past_and_clear_s, [0.0, 1e5]),
+        ]
+    }
+}
+
 impl Default for EncounterConfig {
     fn default() -> Self {
         Self {
@@ -47,6 +92,35 @@ impl Default for EncounterConfig {
             risk_tcpa_s: 1800.0,
             clear_dcpa_factor: 1.5,
             past_and_clear_s: 60.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_threshold_out_of_bounds_is_named_with_a_remedy() {
+        assert_eq!(RulesConfig::default().check(), Ok(()));
+        let mut rules = RulesConfig::default();
+        rules.encounters.abaft_deg = 60.0;
+        let expected = "60 is not possible here: write a number from 90 to 180".to_owned();
+        assert_eq!(rules.check(), Err(("encounters.abaft_deg".to_owned(), expected)));
+        let mut rules = RulesConfig::default();
+        rules.compliance.early_s = f64::NAN;
+        assert_eq!(rules.check().unwrap_err().0, "compliance.early_s");
+    }
+
+    #[test]
+    fn every_key_can_be_read_and_written() {
+        let count = |table: &toml::Value| table.as_table().map_or(0, toml::Table::len);
+        let mut rules = RulesConfig::default();
+        let written = toml::Value::try_from(rules).unwrap();
+        assert_eq!(count(&written["encounters"]), rules.encounters.keys().len());
+        assert_eq!(count(&written["compliance"]), rules.compliance.keys().len());
+        for (table, key) in [("encounters", "risk_tcpa_s"), ("compliance", "safe_contacts")] {
+            assert!(written[table].get(key).is_some(), "{key}");
         }
     }
 }

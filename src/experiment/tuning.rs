@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::encounter::{ComplianceConfig, EncounterConfig};
+use crate::encounter::RulesConfig;
 use crate::env::SeedDomain;
 use crate::policy::PolicyConfigs;
 use crate::scenario::StagedEncounter;
@@ -93,6 +93,8 @@ pub struct TuningConfig {
     pub cross_track_loss: f64,
     /// Seed of the settings that are drawn.
     pub seed: u64,
+    /// What counts as an encounter and as good conduct in it.
+    pub rules: RulesConfig,
     /// What encounters are drawn.
     pub drawn: DrawnEncounters,
 }
@@ -108,6 +110,7 @@ impl Default for TuningConfig {
             compliance_loss: 0.5,
             cross_track_loss: 0.2,
             seed: 1,
+            rules: RulesConfig::default(),
             drawn: DrawnEncounters::default(),
         }
     }
@@ -230,11 +233,8 @@ fn with(settings: &PolicyConfigs, policy: &str, values: &[(&str, f64)]) -> Optio
 
 /// To three significant digits.
 fn rounded(value: f64) -> f64 {
-    if value == 0.0 {
-        return 0.0;
-    }
-    let unit = 10_f64.powi(value.abs().log10().floor() as i32 - 2);
-    (value / unit).round() * unit
+    // By way of text, so that it is the number that a person would write.
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 fn judge(
@@ -249,7 +249,7 @@ fn judge(
         let episode = encounter.run_under(policy.as_mut());
         done();
         let own = episode.steps.iter().map(|step| step.vessels[0].position);
-        let compliance = episode.compliance(&EncounterConfig::default(), &ComplianceConfig::default());
+        let compliance = episode.compliance(&config.rules.encounters, &config.rules.compliance);
         Some(Trial {
             contact: episode.has_contact(),
             compliance: compliance.score,
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn values_are_rounded_to_three_digits() {
-        assert_eq!((rounded(1234.5), rounded(0.0)), (1230.0, 0.0));
-        assert!((rounded(-0.045_67) + 0.0457).abs() < 1e-12);
+        assert_eq!((rounded(1234.5), rounded(0.0), rounded(-0.045_67)), (1230.0, 0.0, -0.0457));
+        assert_eq!(rounded(18.4 * (1.0 + f64::EPSILON)), 18.4);
     }
 }

@@ -21,11 +21,23 @@ pub struct DutiesConfig {
     pub apparent_turn_deg: f64,
     /// ... unless it slows down by this fraction at least.
     pub apparent_slowing: f64,
+    /// Half-angle of the head-on sector (rule 14), in degrees.
+    pub head_on_deg: f64,
+    /// Bearing from which on a vessel is abaft the beam, so that it overtakes (rule 13b), in degrees.
+    pub abaft_deg: f64,
 }
 
 impl Default for DutiesConfig {
     fn default() -> Self {
-        Self { stand_on_until_s: 480.0, clear_factor: 1.2, apparent_turn_deg: 20.0, apparent_slowing: 0.5 }
+        let EncounterConfig { head_on_deg, abaft_deg, .. } = EncounterConfig::default();
+        Self {
+            stand_on_until_s: 480.0,
+            clear_factor: 1.2,
+            apparent_turn_deg: 20.0,
+            apparent_slowing: 0.5,
+            head_on_deg,
+            abaft_deg,
+        }
     }
 }
 
@@ -123,7 +135,8 @@ impl Watch {
                     risk_tcpa_s: f64::INFINITY,
                     clear_dcpa_factor: config.clear_factor,
                     past_and_clear_s: 0.0,
-                    ..EncounterConfig::default()
+                    head_on_deg: config.head_on_deg,
+                    abaft_deg: config.abaft_deg,
                 }));
             }
             let passing = outlook.passing(index, route.heading);

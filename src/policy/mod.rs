@@ -109,6 +109,12 @@ pub trait Policy: fmt::Debug + Send {
     /// What it is called on the command line and in tables.
     fn name(&self) -> &str;
 
+    /// Time between two of its decisions, in seconds, where it has a pace of its own: it is then asked that often, which
+    /// has to be a multiple of the interval at which own ship takes orders. Nothing where it is asked each time.
+    fn decision_interval_s(&self) -> Option<f64> {
+        None
+    }
+
     /// Forgets the last episode. Whatever the policy draws at random follows from `seed`.
     fn reset(&mut self, seed: u64);
 
@@ -184,6 +190,20 @@ impl PolicyConfigs {
         ];
         if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(1e-3..1e6).contains(value)) {
             return Err((key.to_owned(), format!("{value} is not possible here: write a number above 0")));
+        }
+        let costs = [
+            ("velocity-obstacle.speed_cost", vo.speed_cost),
+            ("velocity-obstacle.port_cost", vo.port_cost),
+            ("mpc.collision_cost", mpc.collision_cost),
+            ("mpc.rule_cost", mpc.rule_cost),
+            ("mpc.speed_cost", mpc.speed_cost),
+            ("mpc.heading_cost", mpc.heading_cost),
+            ("mpc.port_cost", mpc.port_cost),
+            ("mpc.change_cost", mpc.change_cost),
+        ];
+        if let Some((key, value)) = costs.into_iter().find(|(_, value)| !(0.0..1e9).contains(value)) {
+            let message = format!("{value} is not possible here: write 0 or a number above it");
+            return Err((key.to_owned(), message));
         }
         let speeds = [
             ("velocity-obstacle.speed_fractions", &vo.speed_fractions),

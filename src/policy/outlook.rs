@@ -37,8 +37,17 @@ pub(super) struct Outlook {
     steps: usize,
     steps_per_decision: usize,
     targets: Vec<Vec<Position>>,
+    /// The longest step of each target ship, in metres.
+    target_step_m: Vec<f64>,
     own: Vec<Position>,
+    /// The longest step of own ship, in metres.
+    own_step_m: f64,
 }
+
+/// Every so many steps the distance is looked at first, for a bound on the closest one.
+const COARSE_STEPS: usize = 12;
+/// What rounding may add to a step, as a fraction.
+const ROUNDING: f64 = 1e-9;
 
 impl Outlook {
     /// Looks `horizon_s` ahead, in the time steps of the situation.
@@ -51,6 +60,12 @@ impl Outlook {
             path.clear();
             path.extend((0..=self.steps).map(|step| target.expected(step as f64 * self.step_s, self.step_s)));
         }
+        self.target_step_m.clear();
+        self.target_step_m.extend(
+            self.targets
+                .iter()
+                .map(|path| path.windows(2).map(|step| step[0].distance_m(step[1])).fold(0.0, f64::max)),
+        );
     }
 
     /// Runs own ship through a manoeuvre.
@@ -59,11 +74,13 @@ impl Outlook {
         let mut way = Displacement::default();
         self.own.clear();
         self.own.push(position);
+        self.own_step_m = 0.0;
         let mut ordered = Manoeuvre { heading: own.ordered_heading, speed_mps: own.velocity.speed_mps() };
         for step in 0..self.steps {
             if step % self.steps_per_decision == 0 && (step == 0 || ordered != manoeuvre) {
                 ordered = manoeuvre.within_reach(ordered, own);
                 way = Velocity::from_course(ordered.heading, ordered.speed_mps).for_seconds(self.step_s);
+                self.own_step_m = self.own_step_m.max(way.length_m());
             }
             position += way;
             self.own.push(position);
@@ -73,6 +90,12 @@ impl Outlook {
     /// Own ship's positions on the last manoeuvre that was run.
     pub fn own(&self) -> &[Position] {
         &self.own
+    }
+
+    /// Whole steps from one at which the two are `distance_m` apart until they may be within `reach_m`.
+    pub fn steps_apart(&self, index: usize, distance_m: f64, reach_m: f64) -> usize {
+        let closing_m = (self.own_step_m + self.target_step_m[index]) * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
+        ((distance_m * (1.0 - ROUNDING) - reach_m) / closing_m).clamp(0.0, self.steps as f64) as usize
     }
 
     /// Time of a step, in seconds from now.
@@ -86,21 +109,34 @@ impl Outlook {
     }
 
     /// The CPA of the last manoeuvre that was run with a target ship; `heading` is that of the manoeuvre.
+    ///
+    /// Steps over which the two cannot come as near as somewhere else are passed over: the result is that of
+    /// looking at all of them.
     pub fn passing(&self, index: usize, heading: Nautical) -> Passing {
-        let between = |step: usize| self.targets[index][step].xy() - self.own[step].xy();
-        let mut before = between(0);
-        let mut closest = Passing { distance_m: before.norm(), time_s: 0.0, starboard_m: 0.0 };
-        let mut relative = before;
-        for step in 0..self.steps {
-            let after = between(step + 1);
-            let approach = Approach::new(before, after);
+        let target = &self.targets[index];
+        let between = |step: usize| target[step].xy() - self.own[step].xy();
+        let bound_m = (0..=self.steps)
+            .step_by(COARSE_STEPS)
+            .map(|step| between(step).norm())
+            .fold(f64::INFINITY, f64::min);
+        let mut relative = between(0);
+        let mut closest = Passing { distance_m: relative.norm(), time_s: 0.0, starboard_m: 0.0 };
+        let mut step = 0;
+        while step < self.steps {
+            let before = between(step);
+            let apart = self.steps_apart(index, before.norm(), bound_m);
+            if apart > 0 {
+                step += apart;
+                continue;
+            }
+            let approach = Approach::new(before, between(step + 1));
             let within = approach.closest();
             if within.distance_m < closest.distance_m {
                 closest.distance_m = within.distance_m;
                 closest.time_s = (step as f64 + within.fraction) * self.step_s;
                 relative = approach.at(within.fraction);
             }
-            before = after;
+            step += 1;
         }
         closest.starboard_m =
             Displacement { north_m: relative.y, east_m: relative.x }.starboard_of_m(heading);

@@ -8,10 +8,12 @@
 //!
 //! - attraction: `c`;
 //! - passing, for a target ship that would come within the safe distance `s` on the way along the route, at a
-//!   distance `d` and after a time `t` under the horizon `T`: `± k_p sqrt(1 - d/s) (1 - t/T) n`. The sign is
-//!   to starboard where the target ship has to be left to port (rules 14, 15) or a turn to port is forbidden
-//!   (rule 17c), else away from where it passes. The square root keeps the force up until the distance is
-//!   nearly safe;
+//!   distance `d` and after a time `t` under the horizon `T`: `± k_p sqrt(m) (1 - t/T) n`, where `m` is what is
+//!   missing: `1 - d/s` where the target ship would be left to the side that own ship has chosen, `1 + d/s` on the
+//!   other. The side is to starboard where any target ship has to be left to port (rules 14, 15) or a turn to port
+//!   is forbidden (rule 17c), else away from where the target ship would pass, and is kept until the encounter is
+//!   over: the force of a plain field changes its sign with the side of the passing, and turns a ship that overtakes
+//!   back into the other's way. The square root keeps the force up until the distance is nearly safe;
 //! - nearness, for one that is nearer than `r` now, at a distance `D`: `k_n (r/D - 1)` away from it.
 //!
 //! A give-way vessel turns so far at least that it is seen to (rule 16).
@@ -50,16 +52,22 @@ pub struct PotentialFieldConfig {
 }
 
 impl Default for PotentialFieldConfig {
+    /// Found by `searoom tune`; docs/encounters.md tells how.
     fn default() -> Self {
         Self {
-            margin_m: 200.0,
-            horizon_s: 900.0,
-            passing_gain: 3.0,
-            near_margin_m: 150.0,
-            near_gain: 2.0,
+            margin_m: 212.0,
+            horizon_s: 1510.0,
+            passing_gain: 7.03,
+            near_margin_m: 21.3,
+            near_gain: 0.42,
             max_deviation_deg: 90.0,
-            lookahead_m: 1000.0,
-            duties: DutiesConfig::default(),
+            lookahead_m: 2860.0,
+            duties: DutiesConfig {
+                stand_on_until_s: 440.0,
+                clear_factor: 1.46,
+                apparent_turn_deg: 18.4,
+                ..DutiesConfig::default()
+            },
         }
     }
 }
@@ -70,6 +78,8 @@ pub struct PotentialField {
     config: PotentialFieldConfig,
     watch: Watch,
     outlook: Outlook,
+    /// Where own ship evades each target ship, as long as the encounter lasts: 1 to starboard, -1 to port.
+    sides: Vec<Option<f64>>,
 }
 
 impl PotentialField {
@@ -79,17 +89,32 @@ impl PotentialField {
         Self { config, ..Self::default() }
     }
 
-    /// Force of a passing, positive to starboard.
-    fn passing_force(&self, duty: &Duty) -> f64 {
-        let missing = 1.0 - duty.passing.distance_m / duty.safe_m;
-        if missing <= 0.0 {
+    /// Chooses a side for every encounter that has begun and forgets it with those that are over.
+    fn choose_sides(&mut self) {
+        let duties = self.watch.duties();
+        let prescribed = |duty: &Duty| duty.leaves_to_port() || duty.forbids_port_turn();
+        // Evading one ship to port and another to starboard would end between them.
+        let all_to_starboard = duties.iter().any(|duty| duty.keeps_clear && prescribed(duty));
+        self.sides.resize(duties.len(), None);
+        for (side, duty) in self.sides.iter_mut().zip(duties) {
+            *side = duty.encounter.map(|_| {
+                let away = if duty.passing.starboard_m > 0.0 { -1.0 } else { 1.0 };
+                if all_to_starboard || prescribed(duty) { 1.0 } else { side.unwrap_or(away) }
+            });
+        }
+    }
+
+    /// Force of a passing that is evaded to a side, positive to starboard.
+    fn passing_force(&self, duty: &Duty, side: f64) -> f64 {
+        let share = duty.passing.distance_m / duty.safe_m;
+        if share >= 1.0 {
             return 0.0;
         }
-        let to_starboard =
-            duty.leaves_to_port() || duty.forbids_port_turn() || duty.passing.starboard_m <= 0.0;
+        // Evaded to starboard, the target ship is left to port.
+        let is_on_chosen_side = duty.passing.starboard_m * side <= 0.0;
+        let missing = if is_on_chosen_side { 1.0 - share } else { 1.0 + share };
         let urgency = (1.0 - duty.passing.time_s / self.config.horizon_s).max(0.0);
-        let size = self.config.passing_gain * missing.sqrt() * urgency;
-        if to_starboard { size } else { -size }
+        side * self.config.passing_gain * missing.sqrt() * urgency
     }
 
     /// Force of a nearness.
@@ -105,11 +130,12 @@ impl PotentialField {
     fn direction(&self, situation: &Situation<'_>, route: Nautical) -> Nautical {
         let starboard = route.turned(std::f64::consts::FRAC_PI_2);
         let mut force = Displacement::towards(route, 1.0);
-        let with_duties = situation.targets.iter().zip(self.watch.duties());
-        for (target, duty) in with_duties.filter(|(_, duty)| duty.keeps_clear) {
+        let with_duties = situation.targets.iter().zip(self.watch.duties()).zip(&self.sides);
+        for ((target, duty), side) in with_duties.filter(|((_, duty), _)| duty.keeps_clear) {
             let away = situation.own.position - target.position;
+            let evading = side.map_or(0.0, |side| self.passing_force(duty, side));
             force = force
-                + Displacement::towards(starboard, self.passing_force(duty))
+                + Displacement::towards(starboard, evading)
                 + self.near_force(away, target.collision_distance_m);
         }
         force.bearing()
@@ -123,12 +149,14 @@ impl Policy for PotentialField {
 
     fn reset(&mut self, _seed: u64) {
         self.watch.reset();
+        self.sides.clear();
     }
 
     fn decide(&mut self, situation: &Situation<'_>) -> Command {
         let route = Manoeuvre::along_route(situation, self.config.lookahead_m);
         self.outlook.fill(situation, self.config.horizon_s);
         self.watch.assess(&self.config.duties, situation, &mut self.outlook, route, self.config.margin_m);
+        self.choose_sides();
         let limit_rad = self.config.max_deviation_deg.to_radians();
         let turn_rad = self.direction(situation, route.heading).turn_from(route.heading);
         let gives_way = self.watch.duties().iter().any(|duty| duty.keeps_clear && duty.gives_way());

@@ -68,25 +68,31 @@ pub struct PredictiveConfig {
 }
 
 impl Default for PredictiveConfig {
+    /// Found by `searoom tune`; docs/encounters.md tells how.
     fn default() -> Self {
         Self {
-            margin_m: 150.0,
-            horizon_s: 900.0,
+            margin_m: 287.0,
+            horizon_s: 1340.0,
             max_deviation_deg: 90.0,
             heading_step_deg: 5.0,
             speed_fractions: vec![1.0, 0.5, 0.0],
-            collision_cost: 10.0,
-            near_time_s: 60.0,
-            time_exponent: 0.5,
+            collision_cost: 86.2,
+            near_time_s: 290.0,
+            time_exponent: 0.339,
             distance_exponent: 4,
-            rule_cost: 5.0,
-            speed_cost: 2.0,
+            rule_cost: 3.11,
+            speed_cost: 1.35,
             heading_cost: 1.0,
-            port_cost: 0.5,
-            // Little enough that the last few degrees back to the route are still worth it.
+            port_cost: 1.1,
+            // The search found 0.55, with which the last few degrees back to the route are not worth it.
             change_cost: 0.02,
-            lookahead_m: 1000.0,
-            duties: DutiesConfig::default(),
+            lookahead_m: 1230.0,
+            duties: DutiesConfig {
+                stand_on_until_s: 407.0,
+                clear_factor: 1.05,
+                apparent_turn_deg: 12.9,
+                ..DutiesConfig::default()
+            },
         }
     }
 }
@@ -101,6 +107,15 @@ pub struct PredictiveControl {
     last_turn_rad: f64,
 }
 
+/// A manoeuvre that is tried.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    manoeuvre: Manoeuvre,
+    deviation: Deviation,
+    /// Its cost without the target ships.
+    own_cost: f64,
+}
+
 impl PredictiveControl {
     /// With settings of its own.
     #[must_use]
@@ -108,20 +123,46 @@ impl PredictiveControl {
         Self { config, ..Self::default() }
     }
 
-    /// `H` of a manoeuvre that deviates by `turn_rad`.
-    fn cost(&mut self, situation: &Situation<'_>, manoeuvre: Manoeuvre, turn_rad: f64) -> f64 {
+    /// What a deviation costs whatever the target ships do.
+    fn own_cost(&self, deviation: Deviation) -> f64 {
+        let config = &self.config;
+        let Deviation { turn_rad, slowness } = deviation;
+        let turn = turn_rad / FRAC_PI_2;
+        let to_port = if turn_rad < 0.0 { 1.0 + config.port_cost } else { 1.0 };
+        config.speed_cost * slowness
+            + config.heading_cost * to_port * turn * turn
+            + config.change_cost * (turn_rad - self.last_turn_rad).abs() / FRAC_PI_2
+    }
+
+    /// Every manoeuvre that is tried, the cheapest first as far as the target ships are left aside.
+    fn candidates(&self, own: &OwnShip<'_>, route: Manoeuvre) -> Vec<Candidate> {
+        let speeds = own.speeds(&self.config.speed_fractions);
+        let mut candidates: Vec<_> = deviations(self.config.max_deviation_deg, self.config.heading_step_deg)
+            .flat_map(|turn_rad| speeds.iter().map(move |&speed_mps| (turn_rad, speed_mps)))
+            .map(|(turn_rad, speed_mps)| {
+                let deviation = Deviation { turn_rad, slowness: own.slowness(speed_mps) };
+                let manoeuvre = Manoeuvre { heading: route.heading.turned(turn_rad), speed_mps };
+                Candidate { manoeuvre, deviation, own_cost: self.own_cost(deviation) }
+            })
+            .collect();
+        candidates.sort_by(|a, b| a.own_cost.total_cmp(&b.own_cost));
+        candidates
+    }
+
+    /// `H` of a manoeuvre; where it is `most` or more, something that is as well.
+    fn cost(&mut self, situation: &Situation<'_>, candidate: Candidate, most: f64) -> f64 {
+        let Candidate { manoeuvre, deviation, own_cost: mut cost } = candidate;
         self.outlook.run(&situation.own, manoeuvre);
         let config = &self.config;
-        let turn = turn_rad / FRAC_PI_2;
-        let deviation = Deviation { turn_rad, slowness: situation.own.slowness(manoeuvre.speed_mps) };
-        let to_port = if turn_rad < 0.0 { 1.0 + config.port_cost } else { 1.0 };
-        let mut cost = config.speed_cost * deviation.slowness
-            + config.heading_cost * to_port * turn * turn
-            + config.change_cost * (turn_rad - self.last_turn_rad).abs() / FRAC_PI_2;
         for (index, duty) in self.watch.duties().iter().enumerate().filter(|(_, duty)| duty.keeps_clear) {
+            if cost >= most {
+                break;
+            }
             let target = &situation.targets[index];
-            cost += self.severity(&situation.own, target) * self.hazard(index, target, duty.safe_m);
             let passing = self.outlook.passing(index, manoeuvre.heading);
+            if passing.distance_m < duty.safe_m {
+                cost += self.severity(&situation.own, target) * self.hazard(index, target, duty.safe_m);
+            }
             if duty.is_broken_by(deviation, &passing, &config.duties) {
                 cost += config.rule_cost;
             }
@@ -139,17 +180,19 @@ impl PredictiveControl {
     fn hazard(&self, index: usize, target: &TargetShip<'_>, safe_m: f64) -> f64 {
         let config = &self.config;
         let floor_m = 0.25 * target.collision_distance_m;
-        let pairs = self.outlook.own().iter().zip(self.outlook.target(index));
-        pairs
-            .enumerate()
-            .map(|(step, (own, target))| (step, own.distance_m(*target)))
-            .filter(|&(_, distance_m)| distance_m < safe_m)
-            .map(|(step, distance_m)| {
+        let (own, path) = (self.outlook.own(), self.outlook.target(index));
+        let mut worst = 0.0_f64;
+        let mut step = 0;
+        while step < own.len() {
+            let distance_m = own[step].distance_m(path[step]);
+            if distance_m < safe_m {
                 let time_s = self.outlook.time_s(step).max(config.near_time_s);
                 let nearness = (safe_m / distance_m.max(floor_m)).powi(config.distance_exponent);
-                (config.near_time_s / time_s).powf(config.time_exponent) * nearness
-            })
-            .fold(0.0, f64::max)
+                worst = worst.max((config.near_time_s / time_s).powf(config.time_exponent) * nearness);
+            }
+            step += self.outlook.steps_apart(index, distance_m, safe_m).max(1);
+        }
+        worst
     }
 }
 
@@ -168,15 +211,14 @@ impl Policy for PredictiveControl {
         let route = Manoeuvre::along_route(situation, self.config.lookahead_m);
         self.outlook.fill(situation, self.config.horizon_s);
         self.watch.assess(&self.config.duties, situation, &mut self.outlook, route, self.config.margin_m);
-        let speeds = own.speeds(&self.config.speed_fractions);
         let mut best = (f64::INFINITY, route, 0.0);
-        for turn_rad in deviations(self.config.max_deviation_deg, self.config.heading_step_deg) {
-            for &speed_mps in &speeds {
-                let manoeuvre = Manoeuvre { heading: route.heading.turned(turn_rad), speed_mps };
-                let cost = self.cost(situation, manoeuvre, turn_rad);
-                if cost < best.0 {
-                    best = (cost, manoeuvre, turn_rad);
-                }
+        for candidate in self.candidates(own, route) {
+            if candidate.own_cost >= best.0 {
+                break;
+            }
+            let cost = self.cost(situation, candidate, best.0);
+            if cost < best.0 {
+                best = (cost, candidate.manoeuvre, candidate.deviation.turn_rad);
             }
         }
         self.last_turn_rad = best.2;

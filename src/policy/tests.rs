@@ -67,10 +67,11 @@ fn a_crossing_ship_from_starboard_is_passed_astern() {
 #[test]
 fn a_stand_on_ship_holds_until_it_has_to_act_and_then_does_not_turn_to_port() {
     let target = meeting(90.0, 7.0, 900.0);
-    for name in SEAMANLIKE {
+    let configs = PolicyConfigs::default();
+    let duties = [configs.velocity_obstacle.duties, configs.potential_field.duties, configs.mpc.duties];
+    for (name, DutiesConfig { stand_on_until_s, .. }) in SEAMANLIKE.into_iter().zip(duties) {
         let sailed = sailed(name, handy(), &[&target], 300);
         assert!(sailed.closest_m > 300.0, "{name}: {}", sailed.closest_m);
-        let stand_on_until_s = DutiesConfig::default().stand_on_until_s;
         let held = ((900.0 - stand_on_until_s) / DT_S) as usize;
         assert!(sailed.cross_track_m[..held].iter().all(|error| error.abs() < 1e-6), "{name}");
         let before_passing = &sailed.cross_track_m[..170];
@@ -81,8 +82,7 @@ fn a_stand_on_ship_holds_until_it_has_to_act_and_then_does_not_turn_to_port() {
 #[test]
 fn a_slow_ship_ahead_is_overtaken_clear() {
     let target = meeting(0.0, 3.0, 600.0);
-    // The potential field is not up to it: near the route its force turns back too soon.
-    for name in [velocity_obstacle::NAME, predictive::NAME] {
+    for name in SEAMANLIKE {
         let sailed = sailed(name, handy(), &[&target], 480);
         assert!(sailed.closest_m > 300.0, "{name}: {}", sailed.closest_m);
     }

@@ -42,8 +42,8 @@ pub enum UnfitAgent {
     },
     /// It decides at another pace.
     #[error(
-        "the agent \"{name}\" was trained to decide every {trained_s} s, here a decision is due every {given_s} s; set \
-         `decision_interval_s` of own ship to {trained_s}"
+        "the agent \"{name}\" was trained to decide every {trained_s} s, which is no multiple of the {given_s} s between \
+         decisions here; set `decision_interval_s` of own ship to {trained_s}, or to a whole part of it"
     )]
     DecisionInterval {
         /// The agent.
@@ -107,14 +107,15 @@ impl TrainedPolicy {
         })
     }
 
-    /// Whether the agent can decide at this pace.
+    /// Whether the agent can decide at the pace of its training where own ship takes orders at this one.
     ///
     /// # Errors
     ///
-    /// When it was trained at another.
+    /// When its own is no multiple of it.
     pub fn check_pace(&self, decision_s: f64) -> Result<(), UnfitAgent> {
         let trained_s = self.config.head_on.decision_interval_s;
-        if (trained_s - decision_s).abs() < 1e-9 {
+        let every = (trained_s / decision_s).round();
+        if every >= 1.0 && (every * decision_s - trained_s).abs() < 1e-9 {
             return Ok(());
         }
         Err(UnfitAgent::DecisionInterval { name: self.name.clone(), trained_s, given_s: decision_s })
@@ -248,6 +249,10 @@ impl TrainedPolicy {
 impl Policy for TrainedPolicy {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn decision_interval_s(&self) -> Option<f64> {
+        Some(self.config.head_on.decision_interval_s)
     }
 
     fn reset(&mut self, _seed: u64) {
@@ -411,7 +416,8 @@ mod tests {
         assert!(error.to_string().contains("open water"), "{error}");
         let policy = policy(false, None);
         assert_eq!(policy.check_pace(20.0), Ok(()));
-        let error = policy.check_pace(10.0).unwrap_err().to_string();
+        assert_eq!(policy.check_pace(10.0), Ok(()));
+        let error = policy.check_pace(15.0).unwrap_err().to_string();
         assert!(error.contains("every 20 s") && error.contains("`decision_interval_s`"), "{error}");
     }
 

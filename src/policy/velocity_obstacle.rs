@@ -48,17 +48,24 @@ pub struct VelocityObstacleConfig {
 }
 
 impl Default for VelocityObstacleConfig {
+    /// Found by `searoom tune`; docs/encounters.md tells how.
     fn default() -> Self {
         Self {
+            // The search found 295 m, which a coastal encounter has no room for.
             margin_m: 150.0,
-            horizon_s: 900.0,
+            horizon_s: 912.0,
             max_deviation_deg: 90.0,
             heading_step_deg: 2.0,
             speed_fractions: vec![1.0, 0.75, 0.5, 0.25],
-            speed_cost: 2.0,
-            port_cost: 0.2,
-            lookahead_m: 1000.0,
-            duties: DutiesConfig::default(),
+            speed_cost: 0.869,
+            port_cost: 0.202,
+            lookahead_m: 2580.0,
+            duties: DutiesConfig {
+                stand_on_until_s: 549.0,
+                clear_factor: 1.28,
+                apparent_turn_deg: 38.4,
+                ..DutiesConfig::default()
+            },
         }
     }
 }
@@ -120,14 +127,18 @@ impl VelocityObstacle {
         candidates
     }
 
-    /// What the obstacles and the rules say of a manoeuvre.
-    fn judge(&mut self, own: &OwnShip<'_>, candidate: Candidate) -> Badness {
+    /// What the obstacles and the rules say of a manoeuvre; where it misses more than `most` of the safe distance,
+    /// something that does as well.
+    fn judge(&mut self, own: &OwnShip<'_>, candidate: Candidate, most: f64) -> Badness {
         let Candidate { manoeuvre, deviation, .. } = candidate;
         self.outlook.run(own, manoeuvre);
         let mut badness = Badness { shortfall: 0.0, violations: 0 };
         for (index, duty) in self.watch.duties().iter().enumerate().filter(|(_, duty)| duty.keeps_clear) {
             let passing = self.outlook.passing(index, manoeuvre.heading);
             badness.shortfall = badness.shortfall.max(1.0 - passing.distance_m / duty.safe_m);
+            if badness.shortfall > most {
+                break;
+            }
             badness.violations += usize::from(duty.is_broken_by(deviation, &passing, &self.config.duties));
         }
         badness
@@ -150,7 +161,8 @@ impl Policy for VelocityObstacle {
         self.watch.assess(&self.config.duties, situation, &mut self.outlook, route, self.config.margin_m);
         let mut best: Option<(Badness, Manoeuvre)> = None;
         for candidate in self.candidates(own, route) {
-            let badness = self.judge(own, candidate);
+            let most = best.map_or(f64::INFINITY, |(least, _)| least.shortfall);
+            let badness = self.judge(own, candidate, most);
             if best.is_none_or(|(least, _)| badness < least) {
                 best = Some((badness, candidate.manoeuvre));
             }

@@ -144,6 +144,24 @@ time = 2020-12-03T04:05:06Z
     }
 
     #[test]
+    fn thresholds_of_encounters_and_compliance_are_keys_of_the_file() {
+        let tables =
+            "seed = 1\n[encounters]\nhead_on_deg = 6\n[compliance]\nearly_s = 900\nsafe_contacts = 3\n";
+        let file = parse(&VALID.replacen("seed = 1\n", tables, 1)).unwrap();
+        let rules = file.scenario.rules;
+        assert_eq!((rules.encounters.head_on_deg, rules.encounters.abaft_deg), (6.0, 112.5));
+        assert_eq!((rules.compliance.early_s, rules.compliance.safe_contacts), (900.0, 3.0));
+        let written = file.scenario.to_toml().unwrap();
+        assert_eq!(parse(&written).unwrap().scenario.rules, rules, "{written}");
+        let expected =
+            "5: key \"encounters.abaft_deg\": 60 is not possible here: write a number from 90 to 180";
+        let told = message("seed = 1\n", "\n[encounters]\nabaft_deg = 60\n");
+        assert!(told.contains(expected), "{told}");
+        let told = message("seed = 1\n", "\n[compliance]\nearly = 60\n");
+        assert!(told.contains("5: key \"compliance.early\": is not a known key: write early_s"), "{told}");
+    }
+
+    #[test]
     fn every_mistake_is_named_with_its_line_and_remedy() {
         let mistakes = [
             (

@@ -10,6 +10,7 @@ use super::encounter_starts::HeadOnKind;
 use super::foresight::ForecasterChoice;
 use super::placement::{Bearing, WantedCpa};
 use crate::angle::Nautical;
+use crate::encounter::RulesConfig;
 use crate::geo::{Geodetic, LocalPlane, MPS_PER_KNOT, Position};
 use crate::track::Track;
 use crate::vessel::mmg::{MmgParameters, Surroundings};
@@ -56,6 +57,8 @@ pub struct Scenario {
     pub own_ship: OwnShip,
     /// The ships it meets.
     pub targets: Vec<Target>,
+    /// What counts as an encounter and as good conduct in it.
+    pub rules: RulesConfig,
     /// Bounds of what is believed of a scenario.
     pub limits: Limits,
 }
@@ -524,6 +527,7 @@ impl Scenario {
             collision_radius_m: 150.0,
             own_ship,
             targets: Vec::new(),
+            rules: RulesConfig::default(),
             limits: Limits::default(),
         }
     }

@@ -15,6 +15,7 @@ use super::moment;
 use super::placement::{Bearing, Passes, WantedCpa};
 use super::section::{Fault, Quantity, Section, Takes};
 use crate::angle::Nautical;
+use crate::encounter::{BoundedKey, RulesConfig};
 use crate::geo::{Geodetic, Position};
 use crate::policy;
 use crate::vessel::{Dynamics, PeriodicConfig, StochasticConfig};
@@ -49,6 +50,7 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
     let origin = root.section("origin")?.map(geodetic_section).transpose()?;
     let sensor_noise = root.section("sensor_noise")?.map(sensor_noise).transpose()?;
     let surroundings = dynamics::surroundings(&mut root, limits)?;
+    let rules = rules(&mut root)?;
     let own_section = root.section("own_ship")?.ok_or_else(|| root.missing(&["own_ship".to_owned()]))?;
     let own_ship = own_ship(own_section, limits)?;
     let targets = targets(root.sections("target")?, directory, limits)?;
@@ -69,6 +71,7 @@ pub(super) fn scenario(root: Section<'_>, name: &str, directory: &Path) -> Resul
         forecast_horizon_s: forecast_horizon_s.unwrap_or(blank.forecast_horizon_s),
         collision_radius_m: collision_radius_m.unwrap_or(blank.collision_radius_m),
         targets,
+        rules,
         limits,
         ..blank
     })
@@ -91,6 +94,27 @@ fn sensor_noise(mut section: Section<'_>) -> Result<SensorNoise, Fault> {
     let sigma_m = section.required_number("sigma_m", SPREAD)?;
     section.finish()?;
     Ok(SensorNoise { sigma_m })
+}
+
+/// The tables `[encounters]` and `[compliance]`.
+fn rules(root: &mut Section<'_>) -> Result<RulesConfig, Fault> {
+    let mut rules = RulesConfig::default();
+    if let Some(section) = root.section("encounters")? {
+        bounded_numbers(section, rules.encounters.keys())?;
+    }
+    if let Some(section) = root.section("compliance")? {
+        bounded_numbers(section, rules.compliance.keys())?;
+    }
+    Ok(rules)
+}
+
+fn bounded_numbers<const N: usize>(mut section: Section<'_>, keys: [BoundedKey<'_>; N]) -> Result<(), Fault> {
+    for (key, value, [least, most]) in keys {
+        if let Some(number) = section.number(key, Takes::Between(least, most))? {
+            *value = number;
+        }
+    }
+    section.finish()
 }
 
 fn own_ship(mut section: Section<'_>, limits: Limits) -> Result<OwnShip, Fault> {

@@ -19,14 +19,20 @@ impl StagedEncounter {
         self.run_under(policy.as_mut())
     }
 
-    /// Runs the encounter under any policy; the same policy gives the same episode.
+    /// Runs the encounter under any policy; the same policy gives the same episode. One with a pace of its own is asked
+    /// at the nearest whole number of decisions; in between own ship keeps what was ordered.
     pub fn run_under(&self, policy: &mut dyn Policy) -> Episode {
         policy.reset(self.scenario.seed);
+        let pace = policy.decision_interval_s().map_or(1.0, |interval_s| interval_s / self.decision_s());
+        let decisions_per_answer = pace.round().max(1.0) as usize;
         let mut voyage = Voyage::new(self);
         let mut steps = vec![voyage.record()];
         for step in 0..self.scenario.steps() {
+            if step % (self.steps_per_decision() * decisions_per_answer) == 0 {
+                voyage.ask(policy, decisions_per_answer);
+            }
             if step % self.steps_per_decision() == 0 {
-                voyage.decide(policy);
+                voyage.order();
             }
             voyage.advance();
             steps.push(voyage.record());
@@ -82,6 +88,8 @@ struct Voyage<'s> {
     /// Where its sensor placed each vessel, up to this step.
     observed: Vec<Vec<Position>>,
     forecasts: Option<TargetForecasts>,
+    /// What the policy answered last.
+    command: Command,
 }
 
 impl<'s> Voyage<'s> {
@@ -108,12 +116,14 @@ impl<'s> Voyage<'s> {
             .map(|(past, sensor)| past.into_iter().map(|position| sensor.measure(position)).collect())
             .collect();
         let forecasts = staged.foresight.as_ref().map(Foresight::begin);
-        let mut voyage = Self { staged, own, world, step: 0, states, sensors, observed, forecasts };
+        let command = Command::default();
+        let mut voyage = Self { staged, own, world, step: 0, states, sensors, observed, forecasts, command };
         voyage.look_ahead();
         voyage
     }
 
-    fn decide(&mut self, policy: &mut dyn Policy) {
+    /// Asks the policy what to do until it is asked again, after so many decisions.
+    fn ask(&mut self, policy: &mut dyn Policy, decisions: usize) {
         let scenario = &self.staged.scenario;
         let targets: Vec<_> = (1..self.states.len())
             .map(|vessel| TargetShip {
@@ -135,14 +145,20 @@ impl<'s> Voyage<'s> {
             max_speed_change_mps: scenario.own_ship.steering.max_speed_change_mps,
             history: &self.observed[0],
         };
-        let command = policy.decide(&Situation {
+        self.command = policy.decide(&Situation {
             time_s: self.step as f64 * scenario.dt_s,
             dt_s: scenario.dt_s,
-            decision_s: self.staged.decision_s(),
+            decision_s: self.staged.decision_s() * decisions as f64,
             own,
             route: &self.staged.route,
             targets: &targets,
         });
+    }
+
+    /// Carries out what the policy answered: the turn once, the speed until the next answer.
+    fn order(&mut self) {
+        let scenario = &self.staged.scenario;
+        let command = Command { turn_rad: std::mem::take(&mut self.command.turn_rad), ..self.command };
         // A policy that leaves the speed alone leaves it to the plan.
         let planned_mps = self.staged.route.speed_mps(self.states[0].position);
         let present_mps = self.states[0].velocity.speed_mps();
@@ -280,6 +296,38 @@ mod tests {
         // 375 s before the start, the start, and 280 s up to the last decision.
         assert_eq!(recorder.target_history.len(), 75 + 1 + 56);
         assert_eq!(recorder.target_history[75], Position { north_m: 4000.0, east_m: 0.0 });
+    }
+
+    /// Turns as far as it may, every 40 s.
+    #[derive(Debug, Default)]
+    struct Unhurried(Recorder);
+
+    impl Policy for Unhurried {
+        fn name(&self) -> &str {
+            "unhurried"
+        }
+
+        fn decision_interval_s(&self) -> Option<f64> {
+            Some(40.0)
+        }
+
+        fn reset(&mut self, seed: u64) {
+            self.0.reset(seed);
+        }
+
+        fn decide(&mut self, situation: &Situation<'_>) -> Command {
+            assert_eq!(situation.decision_s, 40.0);
+            self.0.decide(situation)
+        }
+    }
+
+    #[test]
+    fn a_policy_with_a_pace_of_its_own_is_asked_at_that_and_turns_once_for_each_answer() {
+        let mut unhurried = Unhurried::default();
+        let episode = head_on().set_up().unwrap().run_under(&mut unhurried);
+        assert_eq!(unhurried.0.times_s, (0..8).map(|k| f64::from(k) * 40.0).collect::<Vec<_>>());
+        let turned = episode.steps[60].vessels[0].heading.turn_from(episode.steps[0].vessels[0].heading);
+        assert!((turned.to_degrees() - 8.0 * 2.4).abs() < 1e-9);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::model::{
 use super::placement::{Bearing, Passes, WantedCpa};
 use super::section::Fault;
 use crate::ais::iso_utc;
+use crate::encounter::BoundedKey;
 use crate::geo::MPS_PER_KNOT;
 use crate::vessel::mmg::ParameterSet;
 use crate::vessel::{Dynamics, DynamicsConfig, PeriodicConfig, PilotConfig, StochasticConfig};
@@ -41,6 +42,13 @@ impl Lines {
 
     fn text(&mut self, key: &str, value: &str) {
         self.line(&format!("{key} = {}", text(value)));
+    }
+
+    /// The keys whose values are not the default ones.
+    fn others<const N: usize>(&mut self, keys: [BoundedKey<'_>; N], usual: [BoundedKey<'_>; N]) {
+        for ((key, value, _), (_, default, _)) in keys.into_iter().zip(usual) {
+            self.other(key, *value, *default);
+        }
     }
 
     /// A number where it is not the default.
@@ -119,6 +127,15 @@ impl Scenario {
         if self.sensor_noise != blank.sensor_noise {
             out.table("[sensor_noise]");
             out.number("sigma_m", self.sensor_noise.sigma_m);
+        }
+        let (mut rules, mut usual) = (self.rules, blank.rules);
+        if rules.encounters != usual.encounters {
+            out.table("[encounters]");
+            out.others(rules.encounters.keys(), usual.encounters.keys());
+        }
+        if rules.compliance != usual.compliance {
+            out.table("[compliance]");
+            out.others(rules.compliance.keys(), usual.compliance.keys());
         }
         self.write_own_ship(&mut out);
         for (index, target) in self.targets.iter().enumerate() {

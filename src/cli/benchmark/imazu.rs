@@ -3,17 +3,17 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::atomic_file;
-use crate::cli::policies::PolicyArgs;
+use crate::cli::policies::{self, PolicyArgs, RulesArgs, Waters};
 use crate::cli::progress;
 use crate::cli::table::table;
-use crate::encounter::{ComplianceConfig, EncounterConfig};
+use crate::encounter::RulesConfig;
 use crate::episode::Episode;
-use crate::policy::{HoldCourse, NAMES, PolicyConfigs};
+use crate::policy::{NAMES, Policy, PolicyConfigs};
 use crate::report::pictures::{Picture, PicturePage};
 use crate::scenario::StagedEncounter;
 use crate::scenario::imazu::ImazuProblems;
@@ -25,19 +25,22 @@ Examples:
   searoom benchmark imazu
   searoom benchmark imazu --policies velocity-obstacle,mpc --out out/imazu
   searoom benchmark imazu --cases 1,5,14 --json
+  searoom benchmark imazu --policies rule-based,runs/coastal-lstm-sac-seed-1
   searoom scenario run scenarios/imazu/14.toml --policy mpc      one of them, to be replayed
 
 All ships of a case would meet in one point after 30 minutes; no target ship gives way. The pictures are in
 index.html under --out. docs/encounters.md tells what the columns mean.")]
 pub struct Args {
-    /// Who steers own ship; all of them where not given
-    #[arg(long, value_delimiter = ',', value_parser = NAMES, default_values = NAMES)]
+    /// Who steers own ship: names of classical policies, run folders, files of agents; all classical ones where not given
+    #[arg(long, value_delimiter = ',', value_name = "NAME|PATH", default_values = NAMES)]
     policies: Vec<String>,
     /// Numbers of the problems; all of them where not given
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=22))]
     cases: Vec<u32>,
     #[command(flatten)]
     settings: PolicyArgs,
+    #[command(flatten)]
+    rules: RulesArgs,
     /// Directory for index.html and imazu.svg with a picture of every episode, and imazu.json
     #[arg(long)]
     out: Option<PathBuf>,
@@ -104,13 +107,16 @@ pub(super) fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
         .iter()
         .map(|&number| Ok((number, problems.scenario(number)?.set_up()?)))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let episodes = run_all(&staged, &args.policies, &configs, args.threads)?;
+    let rules = args.rules.load()?;
+    let names = names(&staged, &args.policies, &configs)?;
+    let bench = Bench { staged: &staged, policies: &args.policies, configs: &configs, rules };
+    let episodes = bench.run_all(args.threads)?;
     let outcomes: Vec<Outcome> = episodes.iter().map(|(outcome, _)| outcome.clone()).collect();
-    let results = Results { policies: summarise(&args.policies, &outcomes), episodes: outcomes };
+    let results = Results { policies: summarise(&names, &outcomes), episodes: outcomes };
     if let Some(directory) = &args.out {
         let json = serde_json::to_string_pretty(&results)?;
         atomic_file::write(&directory.join("imazu.json"), |out| out.write_all(json.as_bytes()))?;
-        let page = pictures(&problems, &cases, &args.policies, &episodes);
+        let page = pictures(&problems, &cases, &names, &episodes);
         page.write(&directory.join("index.html"))?;
         page.write_figure(&directory.join("imazu.svg"))?;
     }
@@ -118,44 +124,82 @@ pub(super) fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
         writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
         return Ok(());
     }
-    print(&results, &cases, &args.policies, out)?;
+    print(&results, &cases, &names, out)?;
     if let Some(directory) = &args.out {
         writeln!(out, "Open {} in a browser for the pictures", directory.join("index.html").display())?;
     }
     Ok(())
 }
 
-/// Every case under every policy, case by case.
-fn run_all(
+/// What policies are called in tables; remarks on how they are used go to the terminal.
+fn names(
     staged: &[(u32, StagedEncounter)],
     policies: &[String],
     configs: &PolicyConfigs,
-    threads: Option<usize>,
-) -> anyhow::Result<Vec<(Outcome, Picture)>> {
-    ensure!(threads != Some(0), "--threads is 0: name 1 or more, or leave it out");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    let pool = pool.context("the threads cannot be started; try --threads 1")?;
-    let jobs: Vec<_> = staged.iter().flat_map(|case| policies.iter().map(move |name| (case, name))).collect();
-    let bar = progress::steps(jobs.len() as u64, "episodes");
-    let run = |((number, encounter), name): &(&(u32, StagedEncounter), &String)| {
-        // The names were checked when the command line was read.
-        let mut policy = configs.policy(name).unwrap_or_else(|| Box::new(HoldCourse));
-        let episode = encounter.run_under(policy.as_mut());
-        bar.inc(1);
-        (outcome(*number, encounter, &episode), Picture::of(&episode))
-    };
-    let episodes = pool.install(|| jobs.par_iter().map(run).collect());
-    bar.finish_and_clear();
-    Ok(episodes)
+) -> anyhow::Result<Vec<String>> {
+    let mut names: Vec<String> = Vec::with_capacity(policies.len());
+    let Some((_, encounter)) = staged.first() else { return Ok(policies.to_vec()) };
+    for word in policies {
+        let (policy, remark) = open(word, encounter, configs)?;
+        if names.iter().any(|name| name == policy.name()) {
+            bail!(
+                "--policies has two called \"{}\": give each file or folder a name of its own",
+                policy.name()
+            );
+        }
+        names.push(policy.name().to_owned());
+        if let Some(remark) = remark {
+            eprintln!("note: {remark}");
+        }
+    }
+    Ok(names)
 }
 
-fn outcome(case: u32, encounter: &StagedEncounter, episode: &Episode) -> Outcome {
+fn open(
+    word: &str,
+    encounter: &StagedEncounter,
+    configs: &PolicyConfigs,
+) -> anyhow::Result<(Box<dyn Policy>, Option<String>)> {
+    let origin = encounter.plane.map(|plane| plane.origin);
+    policies::open(word, &Waters { decision_s: encounter.decision_s(), origin }, configs)
+}
+
+/// What is run.
+struct Bench<'a> {
+    staged: &'a [(u32, StagedEncounter)],
+    policies: &'a [String],
+    configs: &'a PolicyConfigs,
+    rules: RulesConfig,
+}
+
+impl Bench<'_> {
+    /// Every case under every policy, case by case.
+    fn run_all(&self, threads: Option<usize>) -> anyhow::Result<Vec<(Outcome, Picture)>> {
+        ensure!(threads != Some(0), "--threads is 0: name 1 or more, or leave it out");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+        let pool = pool.context("the threads cannot be started; try --threads 1")?;
+        let jobs: Vec<_> =
+            self.staged.iter().flat_map(|case| self.policies.iter().map(move |word| (case, word))).collect();
+        let bar = progress::steps(jobs.len() as u64, "episodes");
+        let run = |((number, encounter), word): &(&(u32, StagedEncounter), &String)| {
+            let (mut policy, _) = open(word, encounter, self.configs)?;
+            let episode = encounter.run_under(policy.as_mut());
+            bar.inc(1);
+            Ok((outcome(*number, encounter, &episode, &self.rules), Picture::of(&episode)))
+        };
+        let episodes = pool.install(|| jobs.par_iter().map(run).collect());
+        bar.finish_and_clear();
+        episodes
+    }
+}
+
+fn outcome(case: u32, encounter: &StagedEncounter, episode: &Episode, rules: &RulesConfig) -> Outcome {
     let own = || episode.steps.iter().map(|step| step.vessels[0].position);
     let cross_track = own().map(|position| encounter.route.cross_track_error_m(position).abs());
     let start = encounter.own_start;
     let made_m = own().next_back().map_or(0.0, |end| (end - start.position).along_m(start.velocity.course()));
     let summaries = episode.summaries();
-    let compliance = episode.compliance(&EncounterConfig::default(), &ComplianceConfig::default());
+    let compliance = episode.compliance(&rules.encounters, &rules.compliance);
     Outcome {
         case,
         policy: episode.policy.clone(),

@@ -28,6 +28,7 @@ pub use foresight::{Foresight, ThinnedPath, forecast};
 pub use summary::{ClosestQuantiles, Row, Share, rows};
 pub use voyage::{Voyage, record};
 
+use crate::encounter::RulesConfig;
 use crate::env::coastal::{Coastal, CoastalConfig, CoastalError, RecordedTraffic, ScenarioChoice};
 use crate::env::{ActionError, SeedDomain};
 use crate::forecast::ForecastError;
@@ -45,6 +46,8 @@ pub struct NoiseConfig {
     pub episodes: usize,
     /// Seed of the episodes.
     pub seed: u64,
+    /// What counts as an encounter and as good conduct in it, for the compliance score.
+    pub rules: RulesConfig,
     /// Histories that the forecaster takes in one batch.
     pub forecast_batch: usize,
     /// The episodes; scenario, noise and source of estimates are set by the benchmark.
@@ -58,6 +61,7 @@ impl Default for NoiseConfig {
             scenario: ScenarioChoice::Both,
             episodes: 100,
             seed: 1,
+            rules: RulesConfig::default(),
             forecast_batch: 32,
             coastal: CoastalConfig::default(),
         }
@@ -231,9 +235,10 @@ impl Group<'_> {
             .par_chunks(EPISODES_PER_TASK)
             .map(|task| {
                 let mut env = self.env(config, Some((contestant, foresight)))?;
+                env.keep_steps();
                 let mut helm = contestant.helm();
                 let sail = |&(episode, seed): &(usize, u64)| {
-                    let voyage = Voyage::sail(&mut env, helm.as_mut(), seed);
+                    let voyage = Voyage::sail(&mut env, helm.as_mut(), seed, &config.rules);
                     finished();
                     voyage.map_err(|source| NoiseError::Action {
                         policy: contestant.name.clone(),

@@ -94,6 +94,8 @@ pub struct Row {
     pub contact_at_decision: Share,
     /// Closest distances.
     pub closest_m: ClosestQuantiles,
+    /// Mean compliance with the collision regulations, 0 to 1, over the episodes with an encounter.
+    pub compliance: Option<f64>,
     /// Estimates that rest on a straight line in place of a forecast.
     pub fallbacks: u64,
     /// Contacts with the vessels among them that training has never seen; nothing where there are none.
@@ -144,6 +146,7 @@ impl Row {
             wrong_side: Share::of(voyages.iter(), |voyage| voyage.wrong_side)?,
             contact_at_decision: Share::of(voyages.iter(), |voyage| voyage.contact_at_decision)?,
             closest_m: ClosestQuantiles::of(voyages)?,
+            compliance: mean_compliance(voyages),
             fallbacks: voyages.iter().map(|voyage| voyage.fallbacks).sum(),
             unseen_vessels: (cell.tracks == TracksPart::HeldOut)
                 .then(|| Share::of(unseen(), is_contact))
@@ -151,4 +154,10 @@ impl Row {
             training_tracks: training.and_then(|cell| Share::of(cell.voyages.iter(), is_contact)),
         })
     }
+}
+
+/// Nothing where no episode has an encounter.
+fn mean_compliance(voyages: &[Voyage]) -> Option<f64> {
+    let scores: Vec<f64> = voyages.iter().filter_map(|voyage| voyage.compliance).collect();
+    mean(&scores, CONFIDENCE).map(|estimate| estimate.value)
 }

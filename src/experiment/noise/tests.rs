@@ -179,9 +179,10 @@ fn shared_forecasts_steer_like_live_ones() {
     let coastal =
         CoastalConfig { scenario: ScenarioChoice::BeforeCurve, noise_m: 20.0, ..CoastalConfig::default() };
     let mut env = Coastal::new(coastal, Arc::clone(&waters.traffic), Some(linear())).unwrap();
+    env.keep_steps();
     let mut helm: Box<dyn Policy> = Box::new(Foresighted);
     for voyage in &cell.voyages {
-        assert_eq!(&Voyage::sail(&mut env, &mut helm, voyage.seed).unwrap(), voyage);
+        assert_eq!(&Voyage::sail(&mut env, &mut helm, voyage.seed, &config.rules).unwrap(), voyage);
     }
 }
 

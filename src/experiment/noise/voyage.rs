@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Group, Helm, NoiseConfig, NoiseError};
+use crate::encounter::RulesConfig;
 use crate::env::coastal::Coastal;
 use crate::env::{ActionError, Env};
 use crate::episode::Episode;
@@ -26,17 +27,24 @@ pub struct Voyage {
     pub total_reward: f64,
     /// Estimates that rest on a straight line in place of a forecast.
     pub fallbacks: u64,
+    /// Mean score of its encounters under the collision regulations, 0 to 1; nothing without one.
+    pub compliance: Option<f64>,
     /// The action of every decision.
     pub actions: Vec<f32>,
 }
 
 impl Voyage {
-    /// Sails the episode of `seed`.
+    /// Sails the episode of `seed` in an environment that keeps its steps.
     ///
     /// # Errors
     ///
     /// When the environment refuses an action.
-    pub(super) fn sail(env: &mut Coastal, helm: &mut dyn Helm, seed: u64) -> Result<Self, ActionError> {
+    pub(super) fn sail(
+        env: &mut Coastal,
+        helm: &mut dyn Helm,
+        seed: u64,
+        rules: &RulesConfig,
+    ) -> Result<Self, ActionError> {
         helm.begin(seed);
         let fallbacks_before = env.fallbacks();
         let (mut total_reward, mut actions) = (0.0, Vec::with_capacity(env.max_decisions()));
@@ -52,6 +60,8 @@ impl Voyage {
             }
         }
         let (outcome, opening) = env.outcome().zip(env.opening()).ok_or(ActionError::EpisodeOver)?;
+        let compliance =
+            env.record("").and_then(|episode| episode.compliance(&rules.encounters, &rules.compliance).score);
         Ok(Self {
             seed,
             mmsi: opening.start.mmsi,
@@ -61,6 +71,7 @@ impl Voyage {
             closest_m: outcome.closest_m,
             total_reward,
             fallbacks: env.fallbacks() - fallbacks_before,
+            compliance,
             actions,
         })
     }

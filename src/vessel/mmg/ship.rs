@@ -240,7 +240,12 @@ mod tests {
             (state.position.distance_m(fine.position), turn_rad.to_degrees())
         };
         assert_eq!(MmgConfig::default().steps_per_length, STEPS_PER_LENGTH);
-        let errors = [4.0, 2.0, 1.0, 0.5, 0.25].map(|finer| off(finer * STEPS_PER_LENGTH));
+        let errors = [4.0, 2.0, 1.0, 0.5, 0.25].map(|finer| {
+            let error = off(finer * STEPS_PER_LENGTH);
+            // The table of docs/physics.md.
+            println!("| {} | {:.3} | {:.4} |", finer * STEPS_PER_LENGTH, error.0, error.1);
+            error
+        });
         assert!(errors.windows(2).all(|pair| pair[0].0 < pair[1].0), "{errors:?}");
         let (error_m, error_deg) = errors[2];
         assert!(error_m < 1.0 && error_deg < 0.05, "{errors:?}");

@@ -81,6 +81,7 @@ struct FlatRow<'a> {
     mean_return: f64,
     mean_return_low95: Option<f64>,
     mean_return_high95: Option<f64>,
+    compliance: Option<f64>,
     closest_q01_m: f64,
     closest_q05_m: f64,
     closest_q25_m: f64,
@@ -111,6 +112,7 @@ impl<'a> FlatRow<'a> {
             mean_return: row.mean_return,
             mean_return_low95: row.mean_return_ci95.map(|ends| ends[0]),
             mean_return_high95: row.mean_return_ci95.map(|ends| ends[1]),
+            compliance: row.compliance,
             closest_q01_m: row.closest_m.q01,
             closest_q05_m: row.closest_m.q05,
             closest_q25_m: row.closest_m.q25,
@@ -140,6 +142,7 @@ struct VoyageRow<'a> {
     wrong_side: bool,
     closest_m: f64,
     total_reward: f64,
+    compliance: Option<f64>,
 }
 
 fn voyage_rows(cell: &Cell) -> impl Iterator<Item = VoyageRow<'_>> {
@@ -156,6 +159,7 @@ fn voyage_rows(cell: &Cell) -> impl Iterator<Item = VoyageRow<'_>> {
         wrong_side: voyage.wrong_side,
         closest_m: voyage.closest_m,
         total_reward: voyage.total_reward,
+        compliance: voyage.compliance,
     })
 }
 

@@ -7,6 +7,7 @@ use anyhow::bail;
 use clap::{Args as ClapArgs, ValueEnum};
 use rayon::ThreadPoolBuilder;
 
+use super::super::policies::RulesArgs;
 use super::super::progress;
 use crate::env::coastal::ScenarioChoice;
 use crate::experiment::noise::{
@@ -79,6 +80,8 @@ pub struct Args {
     /// Weights of the forecaster for classical policies
     #[arg(long, default_value = forecasters::SHIPPED)]
     forecaster: PathBuf,
+    #[command(flatten)]
+    rules: RulesArgs,
     /// Threads to compute on; the result is the same for any number [default: all]
     #[arg(long)]
     threads: Option<usize>,
@@ -130,6 +133,7 @@ impl Args {
             scenario: self.scenario.choice(),
             episodes: self.episodes,
             seed: self.seed,
+            rules: self.rules.load()?,
             ..NoiseConfig::default()
         })
     }
