@@ -229,8 +229,8 @@ mod tests {
     }
 
     /// What the default number of steps was chosen by. A hard turn and its recovery, five minutes under
-    /// the autopilot, are compared with steps fifty times smaller: at the default they end within
-    /// centimetres, with a quarter of its steps not within a tenth of a metre.
+    /// the autopilot, are compared with steps fifty times smaller: at the default they end within a metre, with
+    /// a quarter of its steps more than twice as far off.
     #[test]
     fn the_substep_has_converged() {
         let fine = turned(50.0 * STEPS_PER_LENGTH, 60.0, 60).state();
