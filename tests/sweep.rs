@@ -153,7 +153,7 @@ fn shipped_sweeps_are_those_of_the_experiments() {
         ("sweep-coastal.toml", 12, "coastal-lstm-sac-baseline-seed-3"),
         ("sweep-open-water.toml", 12, "open-water-periodic-lstm-sac-baseline-seed-3"),
         ("sweep-open-water-td3.toml", 12, "open-water-periodic-lstm-td3-baseline-seed-3"),
-        ("sweep-history.toml", 24, "open-water-stochastic-lstm-sac-h10-baseline-seed-2"),
+        ("sweep-history.toml", 16, "open-water-stochastic-lstm-sac-h10-baseline-seed-2"),
     ] {
         let path = root.join("models/training").join(file);
         let folder = tempfile::tempdir().unwrap();

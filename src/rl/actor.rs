@@ -79,6 +79,11 @@ impl<T: Real> Actor<T> {
         self.buffers.d_output()
     }
 
+    /// Output of the last [`Self::forward`] and the gradient of the loss with respect to it.
+    pub fn output_and_gradient(&mut self) -> (&[T], &mut [T]) {
+        self.buffers.output_and_gradient()
+    }
+
     /// One step down the gradient that lies in [`Self::d_output`].
     pub fn learn(&mut self, compute: &mut Compute, past: History<'_, T>, learning_rate: f64) {
         self.gradients.clear();

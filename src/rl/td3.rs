@@ -33,6 +33,11 @@ pub struct Td3Config {
     pub policy_delay: u64,
     /// Standard deviation of the noise on explored actions.
     pub exploration_noise_sd: f64,
+    /// Updates of the critics alone before the actor's first; without, it follows their first guess.
+    pub critic_only_updates: u64,
+    /// Weight of `mean |mu(o, h)|^2` in the actor's loss; it keeps the `tanh` from one end where the critics hardly tell
+    /// actions apart.
+    pub action_penalty: f64,
 }
 
 impl Default for Td3Config {
@@ -46,6 +51,8 @@ impl Default for Td3Config {
             target_noise_clip: 0.5,
             policy_delay: 2,
             exploration_noise_sd: 0.1,
+            critic_only_updates: 0,
+            action_penalty: 0.0,
         }
     }
 }
@@ -123,22 +130,27 @@ impl<T: Real> Td3<T> {
         bootstrap(batch, config.discount, &mut self.target);
         let critics = self.critics.learn(compute, batch, &self.target, config.critic_learning_rate);
 
-        let actor = self.updates.is_multiple_of(config.policy_delay).then(|| {
+        let delayed = self.updates.is_multiple_of(config.policy_delay);
+        let actor = (delayed && self.updates >= config.critic_only_updates).then(|| {
             let loss = self.update_actor(compute, batch);
             self.actor.follow(compute, config.target_rate);
-            self.critics.follow(compute, config.target_rate);
             loss
         });
+        if delayed {
+            self.critics.follow(compute, config.target_rate);
+        }
         self.updates += 1;
         Td3Losses { critics, actor }
     }
 
-    /// Up the gradient of `mean Q_1(o, mu(o, h), h)`.
+    /// Up the gradient of `mean Q_1(o, mu(o, h), h)`, less the penalty on actions; returns the loss without it.
     fn update_actor(&mut self, compute: &mut Compute, batch: &Batch<T>) -> f64 {
         let action = self.actor.forward(compute, &batch.observation, history(batch));
         let value = self.critics.first_value(compute, batch, action, &mut self.d_action);
-        for (d_output, &d_action) in self.actor.d_output().iter_mut().zip(&self.d_action) {
-            *d_output = T::ZERO - d_action;
+        let pull = T::from_f64(2.0 * self.config.action_penalty / self.target.len() as f64);
+        let (action, d_output) = self.actor.output_and_gradient();
+        for ((d_output, &d_action), &action) in d_output.iter_mut().zip(&self.d_action).zip(action) {
+            *d_output = pull * action - d_action;
         }
         self.actor.learn(compute, history(batch), self.config.actor_learning_rate);
         -value

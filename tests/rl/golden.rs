@@ -5,6 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use safetensors::{SafeTensors, tensor::TensorView};
 use searoom::nn::{Compute, Gradients, Parameters, Real};
+use searoom::rl::networks::History;
 use searoom::rl::replay::{Batch, ReplayShape};
 use searoom::rl::sac::{Sac, SacConfig};
 use searoom::rl::td3::{Td3, Td3Config};
@@ -250,4 +251,59 @@ fn sac_updates_equal_pytorch_in_f64() {
 #[test]
 fn sac_updates_equal_pytorch_in_f32() {
     check_sac::<f32>(Tolerance::Norm(1e-4), 1);
+}
+
+/// The golden agent under `config`, and its batch.
+fn td3_agent(config: Td3Config) -> (Golden, Td3<f64>, Batch<f64>) {
+    let golden = Golden::open("rl_td3");
+    let rng = &mut ChaCha8Rng::seed_from_u64(0);
+    let mut td3 = Td3::new(config, OBSERVATION, ACTION, HIDDEN, (STEPS, ROWS), rng);
+    golden.load("before.actor.", &mut td3.actor.online);
+    let batch = golden.batch();
+    (golden, td3, batch)
+}
+
+#[test]
+fn the_action_penalty_adds_the_gradient_of_the_mean_squared_action() {
+    let compute = &mut Compute::new(1);
+    let gradient = |action_penalty: f64, compute: &mut Compute| {
+        let (golden, mut td3, batch) = td3_agent(Td3Config { action_penalty, ..Td3Config::default() });
+        td3.update(compute, &batch, &golden.reals("1.noise"));
+        td3.actor.gradients().values().to_vec()
+    };
+    let (without, with) = (gradient(0.0, compute), gradient(0.3, compute));
+
+    let (_, mut td3, batch) = td3_agent(Td3Config::default());
+    let layout = td3.actor.online.layout().clone();
+    for tensor in layout.tensors() {
+        for position in tensor.positions() {
+            let mut shifted = |by: f64| {
+                td3.actor.online.update(|values| values[position] += by);
+                let past = History { observations: &batch.history, lengths: &batch.history_lengths };
+                let action = td3.actor.forward(compute, &batch.observation, past);
+                let squares: f64 = action.iter().map(|a| a * a).sum();
+                td3.actor.online.update(|values| values[position] -= by);
+                0.3 * squares / ROWS as f64
+            };
+            let numeric = (shifted(1e-5) - shifted(-1e-5)) / 2e-5;
+            let ours = with[position] - without[position];
+            assert!((numeric - ours).abs() < 1e-8, "{}: {numeric} {ours}", tensor.name());
+        }
+    }
+}
+
+#[test]
+fn the_actor_waits_for_its_critics_where_it_is_told_to() {
+    let config = Td3Config { critic_only_updates: 3, ..td3_config() };
+    let (golden, mut td3, batch) = td3_agent(config);
+    let compute = &mut Compute::new(1);
+    let weights = |td3: &Td3<f64>| td3.actor.online.values().to_vec();
+    let (actor, critic) = (weights(&td3), td3.critics.critics[0].target.values().to_vec());
+    for _ in 0..4 {
+        assert_eq!(td3.update(compute, &batch, &golden.reals("1.noise")).actor, None);
+    }
+    assert_eq!(weights(&td3), actor);
+    assert_ne!(td3.critics.critics[0].target.values(), critic, "their targets follow all the same");
+    assert!(td3.update(compute, &batch, &golden.reals("1.noise")).actor.is_some());
+    assert_ne!(weights(&td3), actor);
 }
