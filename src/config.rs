@@ -3,7 +3,10 @@
 //!
 //! What the type already says (unknown keys, wrong types, missing keys) is checked here. What only
 //! the reader knows (a box upside down, a track that is not there) is reported by the reader
-//! through [`Source::error_at`], with the span of a [`toml::Spanned`] field.
+//! through [`Source::error_at`], with the span of a [`toml::Spanned`] field, or as a [`Fault`], which
+//! [`Source::located`] finds in the text.
+
+mod fault;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -11,6 +14,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use toml::de::DeTable;
+
+pub(crate) use fault::join;
+pub use fault::{BoundedNumber, Fault, KeyLines, check_bounds};
 
 /// What is wrong in a configuration file, where, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -88,6 +95,31 @@ impl Source {
             key: Some(key.to_owned()),
             message: message.into(),
             remedy: remedy.into(),
+        }
+    }
+
+    /// The text as a TOML document, and the lines of its keys.
+    ///
+    /// # Errors
+    /// On a syntax error.
+    pub fn document(&self) -> Result<(DeTable<'_>, KeyLines), ConfigError> {
+        let document = DeTable::parse(&self.text).map_err(|error| ConfigError {
+            file: self.file.clone(),
+            line: Some(error.span().map_or(1, |span| self.line_of(span.start))),
+            key: None,
+            message: error.message().replace('\n', ", "),
+            remedy: "correct the TOML here".to_owned(),
+        })?;
+        let document = document.into_inner();
+        let lines = KeyLines::new(&self.text, &document);
+        Ok((document, lines))
+    }
+
+    /// Says where in the text a fault is.
+    pub fn located(&self, fault: Fault) -> ConfigError {
+        match self.document() {
+            Ok((_, lines)) => lines.located(&self.file, fault),
+            Err(error) => error,
         }
     }
 

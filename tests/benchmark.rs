@@ -82,7 +82,7 @@ fn an_agent_takes_part_at_its_own_pace_and_thresholds_come_from_a_file() {
     assert!(told.contains("\"hold-curse\" is no policy: write one of hold-course"), "{told}");
     std::fs::write(rules, "[compliance]\nearly_s = 0\n").unwrap();
     let told = refused(&["--rules-config", rules]);
-    assert!(told.contains("rules.toml: key \"compliance.early_s\": 0 is not possible here"), "{told}");
+    assert!(told.contains("rules.toml:2: key \"compliance.early_s\": 0 is not possible here"), "{told}");
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn settings_of_policies_come_from_a_file_and_mistakes_in_it_are_named() {
         ),
         (
             "[mpc]\nheading_step_deg = 0\n",
-            "key \"mpc.heading_step_deg\": 0 is not possible here: write a number above 0",
+            "policies.toml:2: key \"mpc.heading_step_deg\": 0 is not possible here: write a number above 0",
         ),
         ("[mpc]\nspeed_fractions = [2.0]\n", "key \"mpc.speed_fractions\": is no list of fractions"),
     ] {

@@ -45,6 +45,38 @@ fn text(output: &Output) -> (String, String) {
     (read(&output.stdout), read(&output.stderr))
 }
 
+/// What no network or environment can work with is refused before anything is written.
+#[test]
+fn settings_that_cannot_be_worked_with_are_refused_by_line() {
+    let folder = folder();
+    for (text, expected) in [
+        (
+            "env = \"open-water\"\n\n[trainer.agent]\nbatch_size = 0\n",
+            "run.toml:4: key \"trainer.agent.batch_size\": 0 is not possible here: write a number from 1 to",
+        ),
+        ("[trainer.agent.sac]\ndiscount = nan\n", "run.toml:2: key \"trainer.agent.sac.discount\": NaN is"),
+        ("[open_water]\ndecisions = 0\n", "run.toml:2: key \"open_water.decisions\": 0 is not possible here"),
+        (
+            "[open_water]\nsmoothing_half_width = 101\n",
+            "run.toml:2: key \"open_water.smoothing_half_width\": 101 is above forecast_steps, which is 100",
+        ),
+        ("[coastal.head_on]\nspeed_min_mps = 17\n", "17 is above speed_max_mps, which is 16"),
+    ] {
+        fs::write(folder.path().join("run.toml"), text).unwrap();
+        let refused = output(folder.path(), &TRAIN);
+        assert!(!refused.status.success());
+        assert!(text_of_error(&refused).contains(expected), "{}", text_of_error(&refused));
+        assert!(!folder.path().join("run").exists());
+    }
+    fs::write(folder.path().join("run.toml"), CONFIG).unwrap();
+    let refused = output(folder.path(), &[&TRAIN[..], &["--steps", "0"]].concat());
+    assert!(text_of_error(&refused).contains("steps: 0 is not possible here"), "{refused:?}");
+}
+
+fn text_of_error(output: &Output) -> String {
+    text(output).1
+}
+
 #[test]
 fn a_run_trains_is_evaluated_and_is_not_overwritten() {
     let folder = folder();

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::de::Error;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Source};
@@ -88,12 +89,13 @@ impl RunConfig {
     ///
     /// # Errors
     ///
-    /// As [`Source::read`] and [`Source::parse`].
+    /// As [`Source::read`] and [`Source::parse`], and on a number out of its bounds.
     pub fn load(file: &Path, env: Option<EnvName>) -> Result<Self, ConfigError> {
         let source = Source::read(file)?;
         let mut resolved: Self = source.parse()?;
         resolved.env = env.unwrap_or(resolved.env);
         resolved.fill_in(&source.parse()?);
+        resolved.check().map_err(|fault| source.located(fault))?;
         Ok(resolved)
     }
 
@@ -101,10 +103,11 @@ impl RunConfig {
     ///
     /// # Errors
     ///
-    /// On a key that there is not, or a value of the wrong type.
+    /// On a key that there is not, or a value of the wrong type or out of its bounds.
     pub fn from_table(given: &toml::Table) -> Result<Self, toml::de::Error> {
         let mut resolved: Self = given.clone().try_into()?;
         resolved.fill_in(given);
+        resolved.check().map_err(toml::de::Error::custom)?;
         Ok(resolved)
     }
 

@@ -1,5 +1,6 @@
 //! Agents and what they were trained in: the configuration of a run, and its policy in one file.
 
+mod bounds;
 mod config;
 mod trained;
 

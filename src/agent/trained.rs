@@ -154,8 +154,10 @@ fn described(file: &WeightsFile) -> Result<RunConfig, TrainedAgentError> {
         Ok(text) => text,
         Err(_) => return Err(TrainedAgentError::NotDescribed { path }),
     };
-    serde_json::from_str(&text)
-        .map_err(|error| TrainedAgentError::Description { path, reason: error.to_string() })
+    let refused = |reason| TrainedAgentError::Description { path: path.clone(), reason };
+    let config: RunConfig = serde_json::from_str(&text).map_err(|error| refused(error.to_string()))?;
+    config.check().map_err(|fault| refused(fault.to_string()))?;
+    Ok(config)
 }
 
 #[cfg(test)]

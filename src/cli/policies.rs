@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 
 use super::agent_run::load_forecaster;
 use crate::agent::TrainedAgent;
-use crate::config;
+use crate::config::Source;
 use crate::encounter::RulesConfig;
 use crate::forecast::{Forecaster, LstmForecaster};
 use crate::geo::Geodetic;
@@ -24,8 +24,9 @@ impl PolicyArgs {
     /// The settings; the defaults where no file is named.
     pub fn load(&self) -> anyhow::Result<PolicyConfigs> {
         let Some(file) = &self.policy_config else { return Ok(PolicyConfigs::default()) };
-        let configs: PolicyConfigs = config::load(file)?;
-        configs.check().map_err(|(key, message)| anyhow!("{}: key \"{key}\": {message}", file.display()))?;
+        let source = Source::read(file)?;
+        let configs: PolicyConfigs = source.parse()?;
+        configs.check().map_err(|fault| source.located(fault))?;
         Ok(configs)
     }
 }
@@ -43,8 +44,9 @@ impl RulesArgs {
     /// The thresholds; the defaults where no file is named.
     pub fn load(&self) -> anyhow::Result<RulesConfig> {
         let Some(file) = &self.rules_config else { return Ok(RulesConfig::default()) };
-        let rules: RulesConfig = config::load(file)?;
-        rules.check().map_err(|(key, message)| anyhow!("{}: key \"{key}\": {message}", file.display()))?;
+        let source = Source::read(file)?;
+        let rules: RulesConfig = source.parse()?;
+        rules.check().map_err(|fault| source.located(fault))?;
         Ok(rules)
     }
 }

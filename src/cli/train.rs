@@ -134,6 +134,7 @@ fn resolve(args: &Args) -> anyhow::Result<(PathBuf, RunConfig)> {
     if let Some(folder) = &args.resume {
         let mut config = run_config(folder)?;
         config.steps = args.steps.unwrap_or(config.steps);
+        config.check()?;
         return Ok((folder.clone(), config));
     }
     let folder = args.out.clone().context("--out is missing: name a folder for the run")?;
@@ -153,6 +154,7 @@ fn resolve(args: &Args) -> anyhow::Result<(PathBuf, RunConfig)> {
     config.open_water.motion = args.motion.unwrap_or(config.open_water.motion);
     config.trainer.seed = args.seed.unwrap_or(config.trainer.seed);
     config.trainer.agent.algorithm = args.algorithm.unwrap_or(config.trainer.agent.algorithm);
+    config.check()?;
     Ok((folder, config))
 }
 

@@ -1,16 +1,16 @@
 //! `searoom tune`: searches settings of a classical policy, on training seeds alone.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::ensure;
 use serde::Serialize;
 
 use super::policies::PolicyArgs;
 use super::progress;
 use super::table::table;
 use crate::atomic_file;
-use crate::config;
+use crate::config::Source;
 use crate::experiment::tuning::{self, SPACES, Score, Tuned, TuningConfig};
 
 /// Options of `searoom tune`.
@@ -46,19 +46,23 @@ pub struct Args {
     json: bool,
 }
 
+fn load(file: &Path) -> anyhow::Result<TuningConfig> {
+    let source = Source::read(file)?;
+    let config: TuningConfig = source.parse()?;
+    config.rules.check().map_err(|fault| source.located(fault.within("rules")))?;
+    Ok(config)
+}
+
 /// Runs the command.
 pub(super) fn run(args: Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let in_force = args.settings.load()?;
-    let mut config: TuningConfig = args.config.as_deref().map(config::load).transpose()?.unwrap_or_default();
+    let mut config = args.config.as_deref().map(load).transpose()?.unwrap_or_default();
     config.candidates = args.candidates.unwrap_or(config.candidates);
     config.seed = args.seed.unwrap_or(config.seed);
     ensure!(
         config.candidates > 0 && config.encounters > 0 && config.rounds > 0,
         "candidates, encounters and rounds of a search are 1 or more"
     );
-    if let Err((key, message)) = config.rules.check() {
-        bail!("key \"rules.{key}\": {message}");
-    }
     ensure!(
         !config.drawn.steering.is_empty(),
         "key \"drawn.steering\" is empty: write one way to steer or more"

@@ -15,6 +15,8 @@ pub use tracker::{EncounterTracker, Risk};
 
 use serde::{Deserialize, Serialize};
 
+use crate::config::{Fault, check_bounds};
+
 use crate::geo::M_PER_NMI;
 
 /// What counts as an encounter and what as good conduct in it: the tables `[encounters]` and `[compliance]`.
@@ -35,16 +37,10 @@ impl RulesConfig {
     ///
     /// # Errors
     /// The first key whose value cannot be, and what to write instead.
-    pub fn check(mut self) -> Result<(), (String, String)> {
-        let encounters = self.encounters.keys().map(|key| ("encounters", key));
-        let compliance = self.compliance.keys().map(|key| ("compliance", key));
-        for (table, (key, value, [least, most])) in encounters.into_iter().chain(compliance) {
-            if !(least..=most).contains(value) {
-                let message = format!("{value} is not possible here: write a number from {least} to {most}");
-                return Err((format!("{table}.{key}"), message));
-            }
-        }
-        Ok(())
+    pub fn check(mut self) -> Result<(), Fault> {
+        let plain = |(key, value, bounds): BoundedKey<'_>| (key, *value, bounds);
+        check_bounds(self.encounters.keys().map(plain)).map_err(|fault| fault.within("encounters"))?;
+        check_bounds(self.compliance.keys().map(plain)).map_err(|fault| fault.within("compliance"))
     }
 }
 
@@ -105,11 +101,12 @@ mod tests {
         assert_eq!(RulesConfig::default().check(), Ok(()));
         let mut rules = RulesConfig::default();
         rules.encounters.abaft_deg = 60.0;
-        let expected = "60 is not possible here: write a number from 90 to 180".to_owned();
-        assert_eq!(rules.check(), Err(("encounters.abaft_deg".to_owned(), expected)));
+        let expected =
+            Fault::new("encounters.abaft_deg", "60 is not possible here", "write a number from 90 to 180");
+        assert_eq!(rules.check(), Err(expected));
         let mut rules = RulesConfig::default();
         rules.compliance.early_s = f64::NAN;
-        assert_eq!(rules.check().unwrap_err().0, "compliance.early_s");
+        assert_eq!(rules.check().unwrap_err().key, "compliance.early_s");
     }
 
     #[test]

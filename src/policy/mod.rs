@@ -10,6 +10,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::angle::Nautical;
+use crate::config::Fault;
 use crate::geo::{Position, Velocity};
 use crate::vessel::Command;
 
@@ -173,7 +174,7 @@ impl PolicyConfigs {
     ///
     /// # Errors
     /// The first key whose value cannot be, and what to write instead.
-    pub fn check(&self) -> Result<(), (String, String)> {
+    pub fn check(&self) -> Result<(), Fault> {
         let Self { rule_based, velocity_obstacle: vo, potential_field: field, mpc } = self;
         let positive = [
             ("rule-based.heading_step_deg", rule_based.heading_step_deg),
@@ -189,7 +190,8 @@ impl PolicyConfigs {
             ("mpc.lookahead_m", mpc.lookahead_m),
         ];
         if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(1e-3..1e6).contains(value)) {
-            return Err((key.to_owned(), format!("{value} is not possible here: write a number above 0")));
+            let message = format!("{value} is not possible here");
+            return Err(Fault::new(key, message, "write a number above 0"));
         }
         let costs = [
             ("velocity-obstacle.speed_cost", vo.speed_cost),
@@ -202,8 +204,8 @@ impl PolicyConfigs {
             ("mpc.change_cost", mpc.change_cost),
         ];
         if let Some((key, value)) = costs.into_iter().find(|(_, value)| !(0.0..1e9).contains(value)) {
-            let message = format!("{value} is not possible here: write 0 or a number above it");
-            return Err((key.to_owned(), message));
+            let message = format!("{value} is not possible here");
+            return Err(Fault::new(key, message, "write 0 or a number above it"));
         }
         let speeds = [
             ("velocity-obstacle.speed_fractions", &vo.speed_fractions),
@@ -211,9 +213,7 @@ impl PolicyConfigs {
         ];
         let is_fraction = |fraction: &f64| (0.0..=1.0).contains(fraction);
         match speeds.into_iter().find(|(_, list)| list.is_empty() || !list.iter().all(is_fraction)) {
-            Some((key, _)) => {
-                Err((key.to_owned(), "is no list of fractions: write numbers from 0 to 1".to_owned()))
-            }
+            Some((key, _)) => Err(Fault::new(key, "is no list of fractions", "write numbers from 0 to 1")),
             None => Ok(()),
         }
     }

@@ -138,10 +138,10 @@ fn settings_that_cannot_be_worked_with_are_named() {
     assert_eq!(PolicyConfigs::default().check(), Ok(()));
     let mut configs = PolicyConfigs::default();
     configs.mpc.heading_step_deg = f64::NAN;
-    assert_eq!(configs.check().unwrap_err().0, "mpc.heading_step_deg");
+    assert_eq!(configs.check().unwrap_err().key, "mpc.heading_step_deg");
     let mut configs = PolicyConfigs::default();
     configs.velocity_obstacle.speed_fractions.clear();
-    assert_eq!(configs.check().unwrap_err().0, "velocity-obstacle.speed_fractions");
+    assert_eq!(configs.check().unwrap_err().key, "velocity-obstacle.speed_fractions");
 }
 
 #[test]

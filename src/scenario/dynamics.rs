@@ -4,8 +4,9 @@
 use super::model::{Limits, Scenario, ShipSize, Target, TargetMotion};
 use super::parse::{FULL_TURN, SPEED, speed};
 use super::placement::Kinematics;
-use super::section::{Fault, Quantity, Section, Takes};
+use super::section::{Quantity, Section, Takes};
 use crate::angle::Nautical;
+use crate::config::Fault;
 use crate::geo::{Position, Velocity};
 use crate::vessel::mmg::{AutopilotConfig, Kvlcc2Error, ParameterSet, Surroundings, Wind};
 use crate::vessel::{

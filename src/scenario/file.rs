@@ -1,14 +1,11 @@
 //! Scenario files: reading, and telling where in the file something is wrong.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-use toml::de::DeTable;
 
 use super::model::Scenario;
 use super::parse;
-use super::section::{Fault, Section, as_written, line_of, lines_by_path};
-use crate::config::{ConfigError, Source};
+use super::section::Section;
+use crate::config::{ConfigError, Fault, KeyLines, Source};
 
 /// A scenario and the file it came from.
 #[derive(Debug, Clone)]
@@ -16,7 +13,7 @@ pub struct ScenarioFile {
     /// The scenario.
     pub scenario: Scenario,
     file: PathBuf,
-    lines: BTreeMap<String, usize>,
+    lines: KeyLines,
 }
 
 impl ScenarioFile {
@@ -39,37 +36,19 @@ impl ScenarioFile {
 
     fn of(source: &Source) -> Result<Self, ConfigError> {
         let file = source.file.as_path();
-        let table = DeTable::parse(&source.text).map_err(|error| ConfigError {
-            file: file.to_owned(),
-            line: Some(error.span().map_or(1, |span| source.line_of(span.start))),
-            key: None,
-            message: error.message().replace('\n', ", "),
-            remedy: "correct the TOML here".to_owned(),
-        })?;
-        let lines = lines_by_path(source, table.get_ref());
+        let (table, lines) = source.document()?;
         let name = file.file_stem().map_or_else(|| "scenario".into(), |stem| stem.to_string_lossy());
         let directory = file.parent().unwrap_or(Path::new(""));
-        match parse::scenario(Section::root(table.get_ref()), &name, directory) {
+        match parse::scenario(Section::root(&table), &name, directory) {
             Ok(scenario) => Ok(Self { scenario, file: file.to_owned(), lines }),
-            Err(fault) => Err(located(file, &lines, fault)),
+            Err(fault) => Err(lines.located(file, fault)),
         }
     }
 
     /// Says where in this file a fault is.
     #[must_use]
     pub fn located(&self, fault: Fault) -> ConfigError {
-        located(&self.file, &self.lines, fault)
-    }
-}
-
-fn located(file: &Path, lines: &BTreeMap<String, usize>, fault: Fault) -> ConfigError {
-    let key = as_written(lines, &fault.key);
-    ConfigError {
-        file: file.to_owned(),
-        line: Some(line_of(lines, &key)),
-        key: Some(key),
-        message: fault.message,
-        remedy: fault.remedy,
+        self.lines.located(&self.file, fault)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::model::Scenario;
-use super::section::Fault;
+use crate::config::Fault;
 use crate::forecast::{Forecaster, Forecasts, LinearForecaster, LstmForecaster, Model};
 use crate::geo::{LocalPlane, Position};
 

@@ -25,8 +25,8 @@ pub mod streams;
 mod tracks;
 mod write;
 
+pub use crate::config::Fault;
 pub use file::ScenarioFile;
 pub use foresight::ForecasterChoice;
 pub use model::*;
-pub use section::Fault;
 pub use setup::{PlacedTarget, StagedEncounter};

@@ -76,6 +76,8 @@ pub struct Limits {
     pub steps_max: usize,
     /// Least time step, in seconds.
     pub dt_min_s: f64,
+    /// Greatest time step, in seconds.
+    pub dt_max_s: f64,
     /// Greatest number of integration steps of a ship with dynamics.
     pub substeps_max: f64,
 }
@@ -87,6 +89,7 @@ impl Default for Limits {
             extent_max_m: 200_000.0,
             steps_max: 100_000,
             dt_min_s: 0.05,
+            dt_max_s: 3600.0,
             substeps_max: 2e7,
         }
     }

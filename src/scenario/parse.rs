@@ -13,8 +13,9 @@ use super::model::{
 };
 use super::moment;
 use super::placement::{Bearing, Passes, WantedCpa};
-use super::section::{Fault, Quantity, Section, Takes};
+use super::section::{Quantity, Section, Takes};
 use crate::angle::Nautical;
+use crate::config::Fault;
 use crate::encounter::{BoundedKey, RulesConfig};
 use crate::geo::{Geodetic, Position};
 use crate::policy;

@@ -7,8 +7,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::section::{Fault, either};
+use super::section::either;
 use crate::angle::Nautical;
+use crate::config::Fault;
 use crate::geo::{Displacement, Position, Velocity};
 
 /// Which way a target passes own ship: where it crosses own ship's course line (ahead, astern), or

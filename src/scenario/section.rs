@@ -4,41 +4,11 @@
 //! A [`Section`] remembers which keys it was asked for. A key nobody asked for is a fault, and the
 //! keys that were asked for tell what the writer probably meant: `speed` where `speed_kn` is known.
 
-use std::collections::BTreeMap;
-
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::config::Source;
+use crate::config::{Fault, join};
 use crate::geo::{M_PER_NMI, MPS_PER_KNOT};
-
-/// What is wrong with a scenario.
-///
-/// The key is a path: `own_ship.course_deg`, or `target[2].dcpa_m` for the second `[[target]]`
-/// (lists count from 1, as people do).
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{key}: {message}; {remedy}")]
-pub struct Fault {
-    /// Path of the key at fault.
-    pub key: String,
-    /// What is the matter.
-    pub message: String,
-    /// What to write instead.
-    pub remedy: String,
-}
-
-impl Fault {
-    /// A fault of one key.
-    pub fn new(key: impl Into<String>, message: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { key: key.into(), message: message.into(), remedy: remedy.into() }
-    }
-
-    /// The same fault seen from the section that holds the key.
-    #[must_use]
-    pub(super) fn within(self, path: &str) -> Self {
-        Self { key: join(path, &self.key), ..self }
-    }
-}
 
 /// A unit a quantity may be written in: the suffix of the key, and its size in SI.
 pub(super) struct Unit {
@@ -316,81 +286,12 @@ impl<'t> Section<'t> {
     }
 }
 
-/// The line of every key of a document, by path; and of every table.
-pub(super) fn lines_by_path(source: &Source, table: &DeTable<'_>) -> BTreeMap<String, usize> {
-    let starts: Vec<usize> = std::iter::once(0)
-        .chain(source.text.bytes().zip(1..).filter_map(|(byte, next)| (byte == b'\n').then_some(next)))
-        .collect();
-    let line = |offset: usize| starts.partition_point(|start| *start <= offset);
-    let mut lines = BTreeMap::new();
-    collect_lines("", table, &line, &mut lines);
-    lines
-}
-
-fn collect_lines(
-    path: &str,
-    table: &DeTable<'_>,
-    line: &impl Fn(usize) -> usize,
-    lines: &mut BTreeMap<String, usize>,
-) {
-    for (key, value) in table {
-        let path = join(path, key.get_ref());
-        lines.insert(path.clone(), line(key.span().start));
-        match value.get_ref() {
-            DeValue::Table(inner) => collect_lines(&path, inner, line, lines),
-            DeValue::Array(list) => {
-                for (index, item) in list.iter().enumerate() {
-                    let path = format!("{path}[{}]", index + 1);
-                    lines.insert(path.clone(), line(item.span().start));
-                    if let DeValue::Table(inner) = item.get_ref() {
-                        collect_lines(&path, inner, line, lines);
-                    }
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-/// The line of a key, or of the nearest table around it.
-pub(super) fn line_of(lines: &BTreeMap<String, usize>, key: &str) -> usize {
-    let mut path = key;
-    loop {
-        if let Some(line) = lines.get(path) {
-            return *line;
-        }
-        match path.rfind(['.', '[']) {
-            Some(end) => path = &path[..end],
-            None => return 1,
-        }
-    }
-}
-
-/// The key as it is written in the file, where a fault names the same quantity in another unit.
-pub(super) fn as_written(lines: &BTreeMap<String, usize>, key: &str) -> String {
-    let quantity = |key: &str| key.rsplit_once('_').map(|(quantity, _)| quantity.to_owned());
-    let Some(wanted) = quantity(key).filter(|_| !lines.contains_key(key)) else { return key.to_owned() };
-    lines
-        .keys()
-        .find(|other| quantity(other).as_ref() == Some(&wanted))
-        .map_or(key, String::as_str)
-        .to_owned()
-}
-
 /// `a`, `a or b`, `a, b or c`.
 pub(super) fn either(words: &[String]) -> String {
     match words {
         [] => String::new(),
         [only] => only.clone(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
-    }
-}
-
-fn join(path: &str, key: &str) -> String {
-    match (path, key) {
-        ("", key) => key.to_owned(),
-        (path, "") => path.to_owned(),
-        (path, key) => format!("{path}.{key}"),
     }
 }
 
@@ -445,26 +346,5 @@ mod tests {
         assert!(resembles("corse_deg", "course_deg"));
         assert!(!resembles("north_m", "speed_kn"));
         assert!(!resembles("mmi", "dt"));
-    }
-
-    #[test]
-    fn every_key_knows_its_line() {
-        let source =
-            "a = 1\n\n[own]\nb = 2\n\n[[target]]\nc = 1\n[[target]]\nd = [ { e = 1 },\n { e = 2 } ]\n";
-        let table = DeTable::parse(source).unwrap();
-        let lines = lines_by_path(&Source::new("test.toml", source), table.get_ref());
-        for (key, line) in [
-            ("a", 1),
-            ("own", 3),
-            ("own.b", 4),
-            ("target[1]", 6),
-            ("target[1].c", 7),
-            ("target[2]", 8),
-            ("target[2].d[2].e", 10),
-            ("target[2].missing", 8),
-            ("nowhere", 1),
-        ] {
-            assert_eq!(line_of(&lines, key), line, "{key}");
-        }
     }
 }

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use super::encounter_starts::{HeadOnConfig, head_on_pose};
 use super::file::ScenarioFile;
 use super::foresight::Foresight;
-use super::model::{OwnStart, Placement, Point, RelativePlacement, Scenario, ShipSize, Target, TargetMotion};
+use super::model::{
+    Limits, OwnStart, Placement, Point, RelativePlacement, Scenario, ShipSize, Target, TargetMotion,
+};
 use super::placement::{Kinematics, at_range_with_cpa, on_course_with_cpa, seen_at};
-use super::section::Fault;
 use super::streams::{Purpose, stream};
 use super::tracks::{self, TrackLibrary};
-use crate::config::ConfigError;
+use crate::config::{ConfigError, Fault};
 use crate::geo::{LocalPlane, Position, Velocity};
 use crate::policy::{self, Route};
 use crate::track::Track;
@@ -138,12 +139,12 @@ impl Scenario {
     }
 
     fn checked_steps(&self) -> Result<usize, Fault> {
-        let least_s = self.limits.dt_min_s;
-        if !(least_s..=self.duration_s).contains(&self.dt_s) {
+        let Limits { dt_min_s: least_s, dt_max_s: most_s, .. } = self.limits;
+        if !(least_s..=most_s.min(self.duration_s)).contains(&self.dt_s) {
             return Err(Fault::new(
                 "dt_s",
                 format!("a time step of {} s is not possible here", self.dt_s),
-                format!("write {least_s} s or more, and no more than the duration"),
+                format!("write {least_s} to {most_s} s, and no more than the duration"),
             ));
         }
         let steps = self.duration_s / self.dt_s;

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::encounter_starts::{HeadOnConfig, HeadOnKind, HeadOnStarts};
 use super::model::{RecordedStart, RecordedVessel, TrackSource};
-use super::section::Fault;
 use crate::ais::{self, AisError, Area, ImportConfig, iso_utc};
+use crate::config::Fault;
 use crate::geo::LocalPlane;
 use crate::track::Track;
 

@@ -9,8 +9,8 @@ use super::model::{
     TargetMotion, TrackSource,
 };
 use super::placement::{Bearing, Passes, WantedCpa};
-use super::section::Fault;
 use crate::ais::iso_utc;
+use crate::config::Fault;
 use crate::encounter::BoundedKey;
 use crate::geo::MPS_PER_KNOT;
 use crate::vessel::mmg::ParameterSet;

@@ -117,6 +117,19 @@ fn placements_that_go_in_circles_or_nowhere_are_refused() {
 }
 
 #[test]
+fn a_time_step_beyond_its_limits_is_refused() {
+    for dt_s in ["0.01", "1e308"] {
+        let text = format!(
+            "duration_s = 1e308\ndt_s = {dt_s}\n[own_ship]\nnorth_m = 0\neast_m = 0\ncourse_deg = 0\nspeed_kn = 12\n"
+        );
+        let told =
+            ScenarioFile::parse(&text, Path::new("test.toml")).unwrap().set_up().unwrap_err().to_string();
+        assert!(told.starts_with("test.toml:2: key \"dt_s\": a time step of"), "{told}");
+        assert!(told.ends_with("write 0.05 to 3600 s, and no more than the duration"), "{told}");
+    }
+}
+
+#[test]
 fn an_impossible_geometry_is_located_in_the_file() {
     let text = "duration_s = 300\n[own_ship]\nnorth_m = 0\neast_m = 0\ncourse_deg = 0\nspeed_kn = 12\n\
                 [[target]]\nmotion = \"linear\"\nbearing_deg = 30\nrange_m = 500\ntcpa_s = 200\ndcpa_m = 900\n";
