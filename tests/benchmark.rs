@@ -105,7 +105,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 fn the_page_has_a_picture_of_every_episode() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path().to_str().unwrap();
-    let text = imazu(&["--cases", "1,2,3", "--policies", "hold-course,rule-based", "--out", directory]);
+    let text = imazu(&["--cases", "1,2,3", "--policies", "hold-course", "rule-based", "--out", directory]);
     assert!(text.contains("rule-based") && text.contains("contact"), "{text}");
     let page = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
     assert_eq!(page.matches("<svg").count(), 6);

@@ -11,7 +11,6 @@ use crate::rl::sac::SacConfig;
 use crate::rl::td3::Td3Config;
 use crate::rl::trainer::TrainerConfig;
 use crate::scenario::encounter_starts::HeadOnConfig;
-use crate::vessel::{PeriodicConfig, StochasticConfig};
 
 /// Counts of decisions, frames, updates and steps.
 const COUNT: [f64; 2] = [0.0, 1e15];
@@ -49,8 +48,8 @@ impl RunConfig {
         [
             ("", vec![("steps", self.steps as f64, SOME)]),
             ("open_water", open_water_numbers(open_water)),
-            ("open_water.stochastic", stochastic_numbers(&open_water.stochastic)),
-            ("open_water.periodic", periodic_numbers(&open_water.periodic)),
+            ("open_water.stochastic", open_water.stochastic.numbers()),
+            ("open_water.periodic", open_water.periodic.numbers()),
             ("coastal", coastal_numbers(coastal)),
             ("coastal.head_on", head_on_numbers(&coastal.head_on)),
             ("tracks.split", vec![("train_fraction", self.tracks.split.train_fraction, FRACTION)]),
@@ -134,25 +133,6 @@ fn open_water_numbers(config: &OpenWaterConfig) -> Vec<BoundedNumber> {
         ("dcpa_scale_m", config.dcpa_scale_m, POSITIVE),
         ("tcpa_scale_s", config.tcpa_scale_s, POSITIVE),
         ("smoothing_half_width", config.smoothing_half_width as f64, COUNT),
-    ]
-}
-
-fn stochastic_numbers(config: &StochasticConfig) -> Vec<BoundedNumber> {
-    vec![
-        ("phi", config.phi, FRACTION),
-        ("innovation_sd_m", config.innovation_sd_m, SIZE),
-        ("beta", config.beta, FRACTION),
-        ("v_max_mps", config.v_max_mps, POSITIVE),
-        ("burn_in_steps", config.burn_in_steps as f64, [0.0, 1e6]),
-    ]
-}
-
-fn periodic_numbers(config: &PeriodicConfig) -> Vec<BoundedNumber> {
-    vec![
-        ("amplitude_s", config.amplitude_s, SIZE),
-        ("period_steps", config.period_steps, POSITIVE),
-        ("noise_sd_m", config.noise_sd_m, SIZE),
-        ("burn_in_steps", config.burn_in_steps as f64, [0.0, 1e6]),
     ]
 }
 

@@ -19,6 +19,7 @@ use thiserror::Error;
 use crate::geo::Position;
 
 mod best_linear;
+mod bounds;
 pub mod dataset;
 mod encoding;
 mod evaluate;
@@ -43,7 +44,7 @@ pub use lstm::LstmForecaster;
 pub use model::{DataConfig, Model, ModelConfig, ModelError, ModelKind};
 pub use segment::{Quantiles, Segment, quantile, rmse_m};
 pub use split::{Split, SplitConfig, SplitError, split_by_time};
-pub use training::{StageConfig, Trainer, TrainingConfig, TrainingConfigError, Update};
+pub use training::{StageConfig, Trainer, TrainingConfig, Update};
 pub use unrolled::Loss;
 
 /// Predicts a batch of paths.

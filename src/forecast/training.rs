@@ -8,7 +8,6 @@ use std::f64::consts::PI;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::Segment;
 use super::dataset::SegmentSource;
@@ -16,6 +15,7 @@ use super::encoding::{Encoding, Scaling};
 use super::model::ModelKind;
 use super::network::ForecastNetwork;
 use super::unrolled::{Loss, Unrolled};
+use crate::config::Fault;
 use crate::nn::{Adam, AdamConfig, Compute, Gradients, Parameters};
 
 /// A part of the training with settings of its own.
@@ -104,18 +104,6 @@ impl Default for TrainingConfig {
     }
 }
 
-/// What is wrong with a training configuration.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[error("key \"{key}\" is {value}; {remedy}")]
-pub struct TrainingConfigError {
-    /// The key at fault.
-    pub key: String,
-    /// Its value.
-    pub value: String,
-    /// What to write instead.
-    pub remedy: &'static str,
-}
-
 impl TrainingConfig {
     /// Updates of all stages.
     #[must_use]
@@ -127,59 +115,6 @@ impl TrainingConfig {
     #[must_use]
     pub fn most_calls(&self) -> usize {
         self.stages.iter().map(|stage| stage.calls).max().unwrap_or(1)
-    }
-
-    /// Checks ranges.
-    ///
-    /// # Errors
-    ///
-    /// For the first value out of range.
-    pub fn check(&self, kind: ModelKind) -> Result<(), TrainingConfigError> {
-        let fault = |key: &str, value: &dyn ToString, remedy| {
-            Err(TrainingConfigError { key: key.to_owned(), value: value.to_string(), remedy })
-        };
-        let positive = |value: f64| value > 0.0 && value.is_finite();
-        if !positive(self.scaling.step_m) {
-            return fault("scaling.step_m", &self.scaling.step_m, "use a positive number of metres");
-        }
-        if !positive(self.scaling.anchor_m) {
-            return fault("scaling.anchor_m", &self.scaling.anchor_m, "use a positive number of metres");
-        }
-        if !(0.0..1.0).contains(&self.weight_average) {
-            return fault(
-                "weight_average",
-                &self.weight_average,
-                "use a number from 0 up to, not including, 1",
-            );
-        }
-        if !positive(self.max_gradient_norm) {
-            return fault("max_gradient_norm", &self.max_gradient_norm, "use a positive number");
-        }
-        if self.total_steps() == 0 {
-            return fault("stages", &"without steps", "give at least one [[training.stages]] with steps > 0");
-        }
-        let history_steps = kind.history_len() - 1;
-        for (index, stage) in self.stages.iter().enumerate() {
-            let key = |name: &str| format!("stages[{index}].{name}");
-            if stage.batch == 0 {
-                return fault(&key("batch"), &0, "use 1 or more");
-            }
-            if stage.calls == 0 {
-                return fault(&key("calls"), &0, "use 1 or more");
-            }
-            if stage.history_steps > history_steps {
-                let remedy =
-                    "use at most the displacements that the network reads (9 open water, 74 coastal)";
-                return fault(&key("history_steps"), &stage.history_steps, remedy);
-            }
-            if !positive(stage.learning_rate) {
-                return fault(&key("learning_rate"), &stage.learning_rate, "use a positive number");
-            }
-            if !(0.0..1.0).contains(&stage.warmup) {
-                return fault(&key("warmup"), &stage.warmup, "use a number from 0 up to, not including, 1");
-            }
-        }
-        Ok(())
     }
 }
 
@@ -224,8 +159,8 @@ impl Trainer {
         config: TrainingConfig,
         source: Box<dyn SegmentSource>,
         threads: usize,
-    ) -> Result<Self, TrainingConfigError> {
-        config.check(kind)?;
+    ) -> Result<Self, Fault> {
+        config.check(kind).map_err(|fault| fault.within("training"))?;
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
         let network = ForecastNetwork::new(kind.network(), &mut rng);
         rng.set_stream(SEGMENT_STREAM);
@@ -452,7 +387,7 @@ mod tests {
         let stage = StageConfig { history_steps: 10, ..Default::default() };
         let stages = vec![StageConfig::default(), stage];
         let text = refused(TrainingConfig { stages, ..Default::default() });
-        assert!(text.contains("stages[1].history_steps"), "{text}");
+        assert!(text.contains("stages[2].history_steps"), "{text}");
         assert!(refused(TrainingConfig { stages: vec![], ..Default::default() }).contains("stages"));
         assert!(
             refused(TrainingConfig { weight_average: 1.0, ..Default::default() }).contains("weight_average")

@@ -13,6 +13,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::{Linear, OffsetProcess, Span, Wandering};
+use crate::config::BoundedNumber;
 
 /// Constants of the periodic motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,18 @@ pub struct PeriodicConfig {
     pub noise_sd_m: f64,
     /// Steps that the process runs before its vessel appears.
     pub burn_in_steps: usize,
+}
+
+impl PeriodicConfig {
+    /// Its numbers and what they can be.
+    pub(crate) fn numbers(&self) -> Vec<BoundedNumber> {
+        vec![
+            ("amplitude_s", self.amplitude_s, [0.0, 1e6]),
+            ("period_steps", self.period_steps, [1e-3, 1e6]),
+            ("noise_sd_m", self.noise_sd_m, [0.0, 1e6]),
+            ("burn_in_steps", self.burn_in_steps as f64, [0.0, 1e6]),
+        ]
+    }
 }
 
 impl Default for PeriodicConfig {

@@ -10,6 +10,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::{Linear, OffsetProcess, Span, Wandering};
+use crate::config::BoundedNumber;
 
 /// Constants of the stochastic motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,6 +26,19 @@ pub struct StochasticConfig {
     pub v_max_mps: f64,
     /// Steps that the process runs before its vessel appears.
     pub burn_in_steps: usize,
+}
+
+impl StochasticConfig {
+    /// Its numbers and what they can be.
+    pub(crate) fn numbers(&self) -> Vec<BoundedNumber> {
+        vec![
+            ("phi", self.phi, [0.0, 1.0]),
+            ("innovation_sd_m", self.innovation_sd_m, [0.0, 1e6]),
+            ("beta", self.beta, [0.0, 1.0]),
+            ("v_max_mps", self.v_max_mps, [1e-3, 1e6]),
+            ("burn_in_steps", self.burn_in_steps as f64, [0.0, 1e6]),
+        ]
+    }
 }
 
 impl Default for StochasticConfig {

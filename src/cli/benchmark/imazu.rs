@@ -23,16 +23,17 @@ use crate::scenario::imazu::ImazuProblems;
 #[command(after_help = "\
 Examples:
   searoom benchmark imazu
-  searoom benchmark imazu --policies velocity-obstacle,mpc --out out/imazu
+  searoom benchmark imazu --policies velocity-obstacle mpc --out out/imazu
   searoom benchmark imazu --cases 1,5,14 --json
-  searoom benchmark imazu --policies rule-based,runs/coastal-lstm-sac-seed-1
+  searoom benchmark imazu --policies rule-based runs/coastal-lstm-sac-seed-1
   searoom scenario run scenarios/imazu/14.toml --policy mpc      one of them, to be replayed
 
 All ships of a case would meet in one point after 30 minutes; no target ship gives way. The pictures are in
 index.html under --out. docs/encounters.md tells what the columns mean.")]
 pub struct Args {
-    /// Who steers own ship: names of classical policies, run folders, files of agents; all classical ones where not given
-    #[arg(long, value_delimiter = ',', value_name = "NAME|PATH", default_values = NAMES)]
+    /// Who steers own ship: names of classical policies, run folders, files of agents, with blanks or commas between;
+    /// all classical ones where not given
+    #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME|PATH", default_values = NAMES)]
     policies: Vec<String>,
     /// Numbers of the problems; all of them where not given
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=22))]

@@ -14,7 +14,7 @@ use indicatif::ProgressBar;
 use super::data;
 use crate::atomic_file;
 use crate::cli::progress;
-use crate::config;
+use crate::config::Source;
 use crate::forecast::{Model, ModelConfig, Trainer, Update};
 use crate::nn::weights::WeightsFile;
 use crate::report::event_file::EventWriter;
@@ -75,11 +75,12 @@ pub(super) fn run(args: &TrainArgs, out: &mut dyn Write) -> anyhow::Result<()> {
         Some(file) => file.clone(),
         None => args.out.join(CONFIG),
     };
-    let mut config: ModelConfig = config::load(&file)?;
+    let source = Source::read(&file)?;
+    let mut config: ModelConfig = source.parse()?;
+    config.check().map_err(|fault| source.located(fault))?;
     config.training.seed = args.seed.unwrap_or(config.training.seed);
     let training = data::training_source(&config)?;
-    let mut trainer = Trainer::new(config.kind, config.training.clone(), training.source, args.threads)
-        .with_context(|| file.display().to_string())?;
+    let mut trainer = Trainer::new(config.kind, config.training.clone(), training.source, args.threads)?;
     if let Some(start) = &config.training.start_from
         && !args.resume
     {
