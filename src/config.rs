@@ -6,6 +6,7 @@
 //! through [`Source::error_at`], with the span of a [`toml::Spanned`] field, or as a [`Fault`], which
 //! [`Source::located`] finds in the text.
 
+pub(crate) mod bounds;
 mod fault;
 
 use std::collections::BTreeSet;
@@ -16,8 +17,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::de::DeTable;
 
+pub use bounds::{BoundedNumber, check_bounds};
 pub(crate) use fault::join;
-pub use fault::{BoundedNumber, Fault, KeyLines, check_bounds};
+pub use fault::{Fault, KeyLines};
 
 /// What is wrong in a configuration file, where, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

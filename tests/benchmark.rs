@@ -131,7 +131,7 @@ fn settings_of_policies_come_from_a_file_and_mistakes_in_it_are_named() {
         ),
         (
             "[mpc]\nheading_step_deg = 0\n",
-            "policies.toml:2: key \"mpc.heading_step_deg\": 0 is not possible here: write a number above 0",
+            "policies.toml:2: key \"mpc.heading_step_deg\": 0 is not possible here: write a number from 0.001 to 1000000",
         ),
         ("[mpc]\nspeed_fractions = [2.0]\n", "key \"mpc.speed_fractions\": is no list of fractions"),
     ] {

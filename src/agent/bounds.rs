@@ -1,8 +1,7 @@
 //! What the numbers of a run's settings can be.
-//!
-//! Bounds are wide: they keep out what no environment or network can work with, not what is unwise.
 
 use super::RunConfig;
+use crate::config::bounds::{COUNT, FRACTION, HELD, POSITIVE, SIZE, SOME, STEP_S};
 use crate::config::{BoundedNumber, Fault, check_bounds};
 use crate::env::coastal::CoastalConfig;
 use crate::env::open_water::OpenWaterConfig;
@@ -12,17 +11,6 @@ use crate::rl::td3::Td3Config;
 use crate::rl::trainer::TrainerConfig;
 use crate::scenario::encounter_starts::HeadOnConfig;
 
-/// Counts of decisions, frames, updates and steps.
-const COUNT: [f64; 2] = [0.0, 1e15];
-/// Counts of which there is one at least.
-const SOME: [f64; 2] = [1.0, 1e15];
-/// Counts of what is held in memory.
-const HELD: [f64; 2] = [1.0, 1e5];
-const FRACTION: [f64; 2] = [0.0, 1.0];
-/// A length, time or speed that may be zero.
-const SIZE: [f64; 2] = [0.0, 1e6];
-/// One that something is divided by, or that a hull has.
-const POSITIVE: [f64; 2] = [1e-3, 1e6];
 const HALF_TURN_DEG: [f64; 2] = [0.0, 180.0];
 
 impl RunConfig {
@@ -36,9 +24,7 @@ impl RunConfig {
             check_bounds(numbers).map_err(|fault| fault.within(table))?;
         }
         self.check_order()?;
-        self.coastal.head_on.check_dynamics().map_err(|error| {
-            Fault::new(error.key, error.message, error.remedy).within("coastal.head_on.kvlcc2")
-        })
+        self.coastal.head_on.check_dynamics().map_err(|fault| fault.within("coastal.head_on.kvlcc2"))
     }
 
     /// Every number of every table.
@@ -52,7 +38,7 @@ impl RunConfig {
             ("open_water.periodic", open_water.periodic.numbers()),
             ("coastal", coastal_numbers(coastal)),
             ("coastal.head_on", head_on_numbers(&coastal.head_on)),
-            ("tracks.split", vec![("train_fraction", self.tracks.split.train_fraction, FRACTION)]),
+            ("tracks.split", self.tracks.split.numbers()),
             ("trainer", trainer_numbers(trainer)),
             ("trainer.agent", agent_numbers(agent)),
             ("trainer.agent.td3", td3_numbers(&agent.td3)),
@@ -108,7 +94,7 @@ impl RunConfig {
 
 fn open_water_numbers(config: &OpenWaterConfig) -> Vec<BoundedNumber> {
     vec![
-        ("dt_s", config.dt_s, [1e-3, 3600.0]),
+        ("dt_s", config.dt_s, STEP_S),
         ("decisions", config.decisions as f64, SOME),
         ("obstacles_per_rule", config.obstacles_per_rule as f64, [1.0, 1000.0]),
         ("agent_speed_min_mps", config.agent_speed_min_mps, SIZE),
@@ -125,6 +111,7 @@ fn open_water_numbers(config: &OpenWaterConfig) -> Vec<BoundedNumber> {
         ("path_lead_steps", config.path_lead_steps as f64, [0.0, 1e6]),
         ("path_trail_steps", config.path_trail_steps as f64, [0.0, 1e6]),
         ("forecast_steps", config.forecast_steps as f64, HELD),
+        ("smoothing_half_width", config.smoothing_half_width as f64, COUNT),
         ("estimate_every_steps", config.estimate_every_steps as f64, SOME),
         ("position_scale_m", config.position_scale_m, POSITIVE),
         ("vessel_length_m", config.vessel_length_m, POSITIVE),
@@ -132,7 +119,6 @@ fn open_water_numbers(config: &OpenWaterConfig) -> Vec<BoundedNumber> {
         ("collision_radius_m", config.collision_radius_m, POSITIVE),
         ("dcpa_scale_m", config.dcpa_scale_m, POSITIVE),
         ("tcpa_scale_s", config.tcpa_scale_s, POSITIVE),
-        ("smoothing_half_width", config.smoothing_half_width as f64, COUNT),
     ]
 }
 

@@ -44,25 +44,6 @@ pub fn join(path: &str, key: &str) -> String {
     }
 }
 
-/// A number that is checked: its key, its value, and the least and greatest that can be worked with.
-pub type BoundedNumber = (&'static str, f64, [f64; 2]);
-
-/// Checks numbers against their bounds; what is no number is out of them.
-///
-/// # Errors
-/// The first that is out of its bounds.
-pub fn check_bounds(numbers: impl IntoIterator<Item = BoundedNumber>) -> Result<(), Fault> {
-    let mut numbers = numbers.into_iter();
-    match numbers.find(|(_, value, [least, most])| !(least..=most).contains(&value)) {
-        Some((key, value, [least, most])) => Err(Fault::new(
-            key,
-            format!("{value} is not possible here"),
-            format!("write a number from {least} to {most}"),
-        )),
-        None => Ok(()),
-    }
-}
-
 /// The line of every key of a document and of every table, by path.
 #[derive(Debug, Clone)]
 pub struct KeyLines(BTreeMap<String, usize>);

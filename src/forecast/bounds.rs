@@ -2,19 +2,11 @@
 
 use super::dataset::Process;
 use super::{DataConfig, ModelConfig, ModelKind, StageConfig, TrainingConfig};
+use crate::config::bounds::{COUNT, FRACTION, HELD, POSITIVE, SIZE, STEP_S};
 use crate::config::{BoundedNumber, Fault, check_bounds};
 
-const FRACTION: [f64; 2] = [0.0, 1.0];
 /// From 0 up to, not including, 1.
 const BELOW_ONE: [f64; 2] = [0.0, 1.0 - 1e-9];
-/// Counts of what is held in memory.
-const HELD: [f64; 2] = [1.0, 1e5];
-/// A length, time or speed that may be zero.
-const SIZE: [f64; 2] = [0.0, 1e6];
-/// One that something is divided by.
-const POSITIVE: [f64; 2] = [1e-6, 1e6];
-/// Time between two positions, in seconds.
-const STEP_S: [f64; 2] = [1e-3, 3600.0];
 
 impl ModelConfig {
     /// Checks that every number can be worked with.
@@ -41,7 +33,7 @@ impl ModelConfig {
             }
             DataConfig::Recorded { dt_s, split, segments, .. } => {
                 check("data.recorded", vec![("dt_s", *dt_s, STEP_S)])?;
-                check("data.recorded.split", vec![("train_fraction", split.train_fraction, FRACTION)])?;
+                check("data.recorded.split", split.numbers())?;
                 let least_noise_m = segments.least_noise_m;
                 let numbers = vec![
                     ("curve_share", segments.curve_share, FRACTION),
@@ -94,7 +86,7 @@ impl StageConfig {
     fn numbers(&self, kind: ModelKind) -> Vec<BoundedNumber> {
         let displacements = kind.history_len() - 1;
         vec![
-            ("steps", self.steps as f64, [0.0, 1e15]),
+            ("steps", self.steps as f64, COUNT),
             ("batch", self.batch as f64, HELD),
             ("calls", self.calls as f64, HELD),
             ("history_steps", self.history_steps as f64, [0.0, displacements as f64]),

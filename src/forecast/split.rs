@@ -9,6 +9,8 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::config::BoundedNumber;
+use crate::config::bounds::FRACTION;
 use crate::track::Track;
 
 /// Where the split lies.
@@ -17,6 +19,13 @@ use crate::track::Track;
 pub struct SplitConfig {
     /// Part of the time span, from the first to the last position of all tracks, that trains.
     pub train_fraction: f64,
+}
+
+impl SplitConfig {
+    /// Its number and what it can be.
+    pub(crate) fn numbers(&self) -> Vec<BoundedNumber> {
+        vec![("train_fraction", self.train_fraction, FRACTION)]
+    }
 }
 
 impl Default for SplitConfig {

@@ -10,7 +10,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::angle::Nautical;
-use crate::config::Fault;
+use crate::config::bounds::POSITIVE;
+use crate::config::{Fault, check_bounds};
 use crate::geo::{Position, Velocity};
 use crate::vessel::Command;
 
@@ -189,10 +190,6 @@ impl PolicyConfigs {
             ("mpc.near_time_s", mpc.near_time_s),
             ("mpc.lookahead_m", mpc.lookahead_m),
         ];
-        if let Some((key, value)) = positive.into_iter().find(|(_, value)| !(1e-3..1e6).contains(value)) {
-            let message = format!("{value} is not possible here");
-            return Err(Fault::new(key, message, "write a number above 0"));
-        }
         let costs = [
             ("velocity-obstacle.speed_cost", vo.speed_cost),
             ("velocity-obstacle.port_cost", vo.port_cost),
@@ -203,10 +200,8 @@ impl PolicyConfigs {
             ("mpc.port_cost", mpc.port_cost),
             ("mpc.change_cost", mpc.change_cost),
         ];
-        if let Some((key, value)) = costs.into_iter().find(|(_, value)| !(0.0..1e9).contains(value)) {
-            let message = format!("{value} is not possible here");
-            return Err(Fault::new(key, message, "write 0 or a number above it"));
-        }
+        check_bounds(positive.map(|(key, value)| (key, value, POSITIVE)))?;
+        check_bounds(costs.map(|(key, value)| (key, value, [0.0, 1e9])))?;
         let speeds = [
             ("velocity-obstacle.speed_fractions", &vo.speed_fractions),
             ("mpc.speed_fractions", &mpc.speed_fractions),

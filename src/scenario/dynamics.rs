@@ -8,7 +8,7 @@ use super::section::{Quantity, Section, Takes};
 use crate::angle::Nautical;
 use crate::config::Fault;
 use crate::geo::{Position, Velocity};
-use crate::vessel::mmg::{AutopilotConfig, Kvlcc2Error, ParameterSet, Surroundings, Wind};
+use crate::vessel::mmg::{AutopilotConfig, ParameterSet, Surroundings, Wind};
 use crate::vessel::{
     Dynamics, DynamicsConfig, KinematicConfig, Kvlcc2Config, Launch, Pilot, PilotConfig, Piloted, Steered,
     Waypoint,
@@ -141,7 +141,7 @@ impl Scenario {
         if dynamics.dynamics == Dynamics::Kinematic {
             return Ok(());
         }
-        dynamics.kvlcc2.check(0.0).map_err(fault_of)?;
+        dynamics.kvlcc2.check(0.0).map_err(in_ship)?;
         let lengths = self.duration_s / dynamics.kvlcc2.ship().time_unit_s();
         let substeps = lengths * dynamics.kvlcc2.steps_per_length;
         let most = self.limits.substeps_max;
@@ -179,7 +179,7 @@ impl Scenario {
             return Ok(());
         }
         let through_water = velocity - self.surroundings.current;
-        dynamics.kvlcc2.check(through_water.speed_mps()).map_err(fault_of)
+        dynamics.kvlcc2.check(through_water.speed_mps()).map_err(in_ship)
     }
 
     /// A target ship with dynamics, piloted on a straight course.
@@ -250,10 +250,10 @@ fn check_motion(target: &Target) -> Result<(), Fault> {
     ))
 }
 
-fn fault_of(error: Kvlcc2Error) -> Fault {
+/// A fault of the dynamics, seen from the ship.
+fn in_ship(fault: Fault) -> Fault {
     // The length is that of the ship, beside its other dimensions.
-    let key = if error.key == "length_m" { "length_m".to_owned() } else { format!("kvlcc2.{}", error.key) };
-    Fault::new(key, error.message, error.remedy)
+    if fault.key == "length_m" { fault } else { fault.within("kvlcc2") }
 }
 
 #[cfg(test)]

@@ -17,9 +17,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::angle::Nautical;
+use crate::config::Fault;
 use crate::geo::{Displacement, Position, Velocity};
 use crate::track::Track;
-use crate::vessel::mmg::{Kvlcc2Error, Surroundings};
+use crate::vessel::mmg::Surroundings;
 use crate::vessel::{Command, Dynamics, DynamicsConfig, KinematicConfig, Kvlcc2Config, Launch, Steered};
 
 /// Which of the two head-on scenarios of the paper.
@@ -107,7 +108,7 @@ impl HeadOnConfig {
     ///
     /// # Errors
     /// Names the key at fault and says what to write.
-    pub fn check_dynamics(&self) -> Result<(), Kvlcc2Error> {
+    pub fn check_dynamics(&self) -> Result<(), Fault> {
         match self.dynamics {
             Dynamics::Kinematic => Ok(()),
             Dynamics::Kvlcc2 => self.kvlcc2.check(self.own_speed_mps),

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Linear, OffsetProcess, Span, Wandering};
 use crate::config::BoundedNumber;
+use crate::config::bounds::{POSITIVE, SIZE};
 
 /// Constants of the periodic motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,10 +34,10 @@ impl PeriodicConfig {
     /// Its numbers and what they can be.
     pub(crate) fn numbers(&self) -> Vec<BoundedNumber> {
         vec![
-            ("amplitude_s", self.amplitude_s, [0.0, 1e6]),
-            ("period_steps", self.period_steps, [1e-3, 1e6]),
-            ("noise_sd_m", self.noise_sd_m, [0.0, 1e6]),
-            ("burn_in_steps", self.burn_in_steps as f64, [0.0, 1e6]),
+            ("amplitude_s", self.amplitude_s, SIZE),
+            ("period_steps", self.period_steps, POSITIVE),
+            ("noise_sd_m", self.noise_sd_m, SIZE),
+            ("burn_in_steps", self.burn_in_steps as f64, SIZE),
         ]
     }
 }

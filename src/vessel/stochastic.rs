@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Linear, OffsetProcess, Span, Wandering};
 use crate::config::BoundedNumber;
+use crate::config::bounds::{FRACTION, POSITIVE, SIZE};
 
 /// Constants of the stochastic motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,11 +33,11 @@ impl StochasticConfig {
     /// Its numbers and what they can be.
     pub(crate) fn numbers(&self) -> Vec<BoundedNumber> {
         vec![
-            ("phi", self.phi, [0.0, 1.0]),
-            ("innovation_sd_m", self.innovation_sd_m, [0.0, 1e6]),
-            ("beta", self.beta, [0.0, 1.0]),
-            ("v_max_mps", self.v_max_mps, [1e-3, 1e6]),
-            ("burn_in_steps", self.burn_in_steps as f64, [0.0, 1e6]),
+            ("phi", self.phi, FRACTION),
+            ("innovation_sd_m", self.innovation_sd_m, SIZE),
+            ("beta", self.beta, FRACTION),
+            ("v_max_mps", self.v_max_mps, POSITIVE),
+            ("burn_in_steps", self.burn_in_steps as f64, SIZE),
         ]
     }
 }

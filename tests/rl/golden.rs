@@ -166,18 +166,24 @@ fn sac_config() -> SacConfig {
     }
 }
 
-fn check_td3<T: Real>(tolerance: Tolerance, threads: usize) {
+/// The agent before the first golden update, and the batch of that.
+fn td3_agent<T: Real>(config: Td3Config) -> (Golden, Td3<T>, Batch<T>) {
     let golden = Golden::open("rl_td3");
-    let compute = &mut Compute::new(threads);
     let rng = &mut ChaCha8Rng::seed_from_u64(0);
-    let mut td3 = Td3::<T>::new(td3_config(), OBSERVATION, ACTION, HIDDEN, (STEPS, ROWS), rng);
+    let mut td3 = Td3::new(config, OBSERVATION, ACTION, HIDDEN, (STEPS, ROWS), rng);
     golden.load("before.actor.", &mut td3.actor.online);
     golden.load("before.actor_target.", &mut td3.actor.target);
     for (critic, name) in td3.critics.critics.iter_mut().zip(["critic_1", "critic_2"]) {
         golden.load(&format!("before.{name}."), &mut critic.online);
         golden.load(&format!("before.{name}_target."), &mut critic.target);
     }
-    let batch = golden.batch::<T>();
+    let batch = golden.batch();
+    (golden, td3, batch)
+}
+
+fn check_td3<T: Real>(tolerance: Tolerance, threads: usize) {
+    let (golden, mut td3, batch) = td3_agent::<T>(td3_config());
+    let compute = &mut Compute::new(threads);
     for update in 1..=UPDATES {
         let losses = td3.update(compute, &batch, &golden.reals::<T>(&format!("{update}.noise")));
         for (critic, (name, loss)) in
@@ -253,27 +259,17 @@ fn sac_updates_equal_pytorch_in_f32() {
     check_sac::<f32>(Tolerance::Norm(1e-4), 1);
 }
 
-/// The golden agent under `config`, and its batch.
-fn td3_agent(config: Td3Config) -> (Golden, Td3<f64>, Batch<f64>) {
-    let golden = Golden::open("rl_td3");
-    let rng = &mut ChaCha8Rng::seed_from_u64(0);
-    let mut td3 = Td3::new(config, OBSERVATION, ACTION, HIDDEN, (STEPS, ROWS), rng);
-    golden.load("before.actor.", &mut td3.actor.online);
-    let batch = golden.batch();
-    (golden, td3, batch)
-}
-
 #[test]
 fn the_action_penalty_adds_the_gradient_of_the_mean_squared_action() {
     let compute = &mut Compute::new(1);
     let gradient = |action_penalty: f64, compute: &mut Compute| {
-        let (golden, mut td3, batch) = td3_agent(Td3Config { action_penalty, ..Td3Config::default() });
+        let (golden, mut td3, batch) = td3_agent::<f64>(Td3Config { action_penalty, ..Td3Config::default() });
         td3.update(compute, &batch, &golden.reals("1.noise"));
         td3.actor.gradients().values().to_vec()
     };
     let (without, with) = (gradient(0.0, compute), gradient(0.3, compute));
 
-    let (_, mut td3, batch) = td3_agent(Td3Config::default());
+    let (_, mut td3, batch) = td3_agent::<f64>(Td3Config::default());
     let layout = td3.actor.online.layout().clone();
     for tensor in layout.tensors() {
         for position in tensor.positions() {

@@ -50,6 +50,7 @@ use thiserror::Error;
 use observation::{SensedObstacle, SensedOwn};
 
 use super::{ActionError, Env, RewardTerm, Step, check_action};
+use crate::config::Fault;
 use crate::cpa::linear::closest_approach;
 use crate::cpa::{Cpa, CpaConfig, Estimator, StraightMotion};
 use crate::forecast::sample_table::Sample;
@@ -57,7 +58,6 @@ use crate::forecast::{Basis, Forecaster};
 use crate::geo::Position;
 use crate::scenario::encounter_starts::{HeadOnKind, HeadOnStart, HeadOnStarts};
 use crate::track::Track;
-use crate::vessel::mmg::Kvlcc2Error;
 use crate::vessel::{Command, Dynamics, Linear, Motion, Recorded, Steered, VesselState};
 use crate::world::{Bow, Hull, HullError, PairReport, VesselBody, VesselId, World, WorldConfig};
 
@@ -92,7 +92,7 @@ pub enum CoastalError {
     Hull(#[from] HullError),
     /// Own ship's dynamics cannot be.
     #[error("head_on.kvlcc2.{0}")]
-    Dynamics(#[from] Kvlcc2Error),
+    Dynamics(#[from] Fault),
 }
 
 /// The recorded vessels of an area and the starts found on their tracks; shared by many environments.

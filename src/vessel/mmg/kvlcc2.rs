@@ -1,10 +1,10 @@
 //! KVLCC2 at any length, as scenarios and environments choose it.
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::parameters::{MmgParameters, ParameterSet};
 use super::ship::{AutopilotConfig, MmgConfig};
+use crate::config::{Fault, check_bounds};
 
 /// Which KVLCC2: its length, its engine and its rudder.
 ///
@@ -52,18 +52,6 @@ impl Default for Kvlcc2Config {
     }
 }
 
-/// Why there is no such ship.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{key}: {message}; {remedy}")]
-pub struct Kvlcc2Error {
-    /// The key of [`Kvlcc2Config`] at fault.
-    pub key: &'static str,
-    /// What is the matter.
-    pub message: String,
-    /// What to write instead.
-    pub remedy: String,
-}
-
 impl Kvlcc2Config {
     /// Dimensions and coefficients.
     #[must_use]
@@ -100,43 +88,32 @@ impl Kvlcc2Config {
     ///
     /// # Errors
     /// Names the key at fault and says what to write.
-    pub fn check(&self, speed_mps: f64) -> Result<(), Kvlcc2Error> {
+    pub fn check(&self, speed_mps: f64) -> Result<(), Fault> {
         let design = self.ship();
         let AutopilotConfig { heading_gain, yaw_gain, speed_gain, max_revolutions } = self.autopilot;
-        let bounded = [
-            ("length_m", self.length_m, 1.0, 600.0),
-            ("service_speed_mps", design.design_speed_mps, 0.1, 35.0),
-            ("max_rudder_deg", self.max_rudder_deg, 1.0, 45.0),
-            ("rudder_rate_deg_per_s", design.rudder_rate_deg_per_s, 0.1, 100.0),
-            ("autopilot.heading_gain", heading_gain, 0.0, 100.0),
-            ("autopilot.yaw_gain", yaw_gain, 0.0, 100.0),
-            ("autopilot.speed_gain", speed_gain, 0.0, 100.0),
-            ("autopilot.max_revolutions", max_revolutions, 0.1, 10.0),
-            ("steps_per_length", self.steps_per_length, 10.0, 10_000.0),
-        ];
-        for (key, value, least, most) in bounded {
-            if !(least..=most).contains(&value) {
-                return Err(Kvlcc2Error {
-                    key,
-                    message: format!("{value} is not possible here"),
-                    remedy: format!("write a number from {least} to {most}"),
-                });
-            }
-        }
+        check_bounds([
+            ("length_m", self.length_m, [1.0, 600.0]),
+            ("service_speed_mps", design.design_speed_mps, [0.1, 35.0]),
+            ("max_rudder_deg", self.max_rudder_deg, [1.0, 45.0]),
+            ("rudder_rate_deg_per_s", design.rudder_rate_deg_per_s, [0.1, 100.0]),
+            ("autopilot.heading_gain", heading_gain, [0.0, 100.0]),
+            ("autopilot.yaw_gain", yaw_gain, [0.0, 100.0]),
+            ("autopilot.speed_gain", speed_gain, [0.0, 100.0]),
+            ("autopilot.max_revolutions", max_revolutions, [0.1, 10.0]),
+            ("steps_per_length", self.steps_per_length, [10.0, 10_000.0]),
+        ])?;
         let top_mps = self.top_speed_mps();
         // A speed that was converted from knots may be off by its last digits.
         if speed_mps > top_mps * (1.0 + 1e-9) {
-            return Err(Kvlcc2Error {
-                key: "service_speed_mps",
-                message: format!(
+            return Err(Fault::new(
+                "service_speed_mps",
+                format!(
                     "the engine of KVLCC2 at a length of {:.0} m keeps {top_mps:.1} m/s, less than the \
                      {speed_mps:.1} m/s wanted",
                     self.length_m
                 ),
-                remedy: format!(
-                    "write a lower speed, a greater length_m, or service_speed_mps = {speed_mps:.1}"
-                ),
-            });
+                format!("write a lower speed, a greater length_m, or service_speed_mps = {speed_mps:.1}"),
+            ));
         }
         Ok(())
     }

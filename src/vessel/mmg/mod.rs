@@ -26,6 +26,6 @@ pub mod published;
 mod ship;
 
 pub use dynamics::{Actuators, Hydrodynamics, MmgMotion, Surroundings, Wind};
-pub use kvlcc2::{Kvlcc2Config, Kvlcc2Error};
+pub use kvlcc2::Kvlcc2Config;
 pub use parameters::{MmgParameters, ParameterSet, Windage};
 pub use ship::{AutopilotConfig, MmgConfig, MmgShip};
