@@ -305,7 +305,7 @@ impl Curve {
         self.last_step().is_some_and(|last| last + self.run.evaluate_every > self.run.steps)
     }
 
-    fn at(&self, step: u64) -> Option<f64> {
+    pub(super) fn at(&self, step: u64) -> Option<f64> {
         let index = self.points.binary_search_by_key(&step, |point| point.step).ok()?;
         Some(self.points[index].mean_return)
     }

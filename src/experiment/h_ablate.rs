@@ -10,6 +10,8 @@ use crate::report::figure::{Figure, LegendPlace, Line, Panel, Stroke, Whisker};
 pub const HISTORY_LENGTHS: [usize; 3] = [4, 7, 10];
 /// Agents stand this far apart around a length, so that their intervals do not cover each other.
 const APART: f64 = 0.22;
+/// The interval of two seeds is some twelve times as wide as they are apart, and tells less than the two do.
+const SEEDS_OF_A_BAR: usize = 3;
 
 /// A group that is compared, and its return.
 struct Column<'a> {
@@ -61,8 +63,9 @@ pub fn make(curves: &[Curve]) -> Option<Product> {
     }
     let curves = columns.iter().flat_map(|column| column.group.curves.iter().copied());
     let caption = format!(
-        "Test return after {} training steps over the length l of the history: mean over seeds, bars are 95 % \
-         t-intervals over seeds (none with one seed). {} {}. The paper: {} seeds, {} steps.",
+        "Test return after {} training steps over the length l of the history: small marks are single seeds, large \
+         ones their means; bars are 95 % t-intervals of the mean from {SEEDS_OF_A_BAR} seeds on. {} {}. The paper: {} \
+         seeds, {} steps.",
         thousands(step),
         ran.join(" "),
         capitalised(&commits(curves)),
@@ -84,15 +87,17 @@ fn panel(waters: Waters, columns: &[&Column<'_>], step: u64, data: &mut DataTabl
     let (mut lines, mut whiskers) = (Vec::new(), Vec::new());
     for (index, agent) in AgentKind::ALL.into_iter().enumerate() {
         let (colour, stroke) = style(agent);
-        let mut points = Vec::new();
+        let (mut points, mut single) = (Vec::new(), Vec::new());
         for column in columns.iter().filter(|column| column.group.agent == agent) {
             let Some(point) = column.group.points().into_iter().find(|point| point.step == step) else {
                 continue;
             };
             let x = column.history_len as f64 + APART * (index as f64 - 1.5);
             points.push((x, point.mean_return.value));
+            single.extend(column.group.curves.iter().filter_map(|curve| Some((x, curve.at(step)?))));
             let interval = point.mean_return.interval;
-            whiskers.extend(interval.map(|at| Whisker { colour, x, low: at.low, high: at.high }));
+            let bar = interval.filter(|_| column.group.curves.len() >= SEEDS_OF_A_BAR);
+            whiskers.extend(bar.map(|at| Whisker { colour, x, low: at.low, high: at.high }));
             data.push(data_row![
                 waters.slug(),
                 column.history_len,
@@ -107,6 +112,7 @@ fn panel(waters: Waters, columns: &[&Column<'_>], step: u64, data: &mut DataTabl
         if !points.is_empty() {
             let mark = if agent.estimates { Stroke::Dots } else { Stroke::Squares };
             lines.push(Line { stroke, width: 1, ..Line::solid("", colour, points.clone()) });
+            lines.push(Line::marks("", colour, mark, 2, single));
             lines.push(Line::marks(agent.label(), colour, mark, 4, points));
         }
     }
@@ -117,7 +123,7 @@ fn panel(waters: Waters, columns: &[&Column<'_>], step: u64, data: &mut DataTabl
         lines,
         whiskers,
         close_up: true,
-        legend: LegendPlace::Emptiest,
+        legend: LegendPlace::UpperMiddle,
         size_px: Some((520, 460)),
         ..Panel::default()
     }
