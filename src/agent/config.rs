@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::de::Error;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Source};
@@ -99,15 +98,14 @@ impl RunConfig {
         Ok(resolved)
     }
 
-    /// The same from settings in memory.
+    /// The same from settings in memory, whose numbers are yet to be checked.
     ///
     /// # Errors
     ///
-    /// On a key that there is not, or a value of the wrong type or out of its bounds.
+    /// On a key that there is not, or a value of the wrong type.
     pub fn from_table(given: &toml::Table) -> Result<Self, toml::de::Error> {
         let mut resolved: Self = given.clone().try_into()?;
         resolved.fill_in(given);
-        resolved.check().map_err(toml::de::Error::custom)?;
         Ok(resolved)
     }
 

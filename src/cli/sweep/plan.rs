@@ -84,6 +84,8 @@ impl SweepConfig {
                 bail!("{}: `grid.{key}` is empty: give it values or leave it out", file.display());
             }
         }
+        let settings = config.settings().with_context(|| file.display().to_string())?;
+        settings.check().map_err(|fault| source.located(fault.within("settings")))?;
         Ok(config)
     }
 
@@ -94,7 +96,7 @@ impl SweepConfig {
 
     /// All runs, those of one agent one after the other by seed.
     pub fn runs(&self) -> anyhow::Result<Vec<PlannedRun>> {
-        let base = self.resolve(&toml::Table::new()).context("`settings`")?;
+        let base = self.settings()?;
         let mut runs = Vec::new();
         for env in or_default(&self.env, base.env) {
             let motions = or_default(&self.motion, base.open_water.motion);
@@ -132,6 +134,7 @@ impl SweepConfig {
             config.trainer.agent.algorithm = point.algorithm;
             config.estimates = point.estimates;
             let agent = agent_name(&config, &choice);
+            config.check().with_context(|| agent.clone())?;
             for &seed in &self.seeds {
                 let mut config = config.clone();
                 config.trainer.seed = seed;
@@ -163,6 +166,11 @@ impl SweepConfig {
             };
             choices.iter().flat_map(longer).collect()
         })
+    }
+
+    /// The settings of every run; what they do not say is the default.
+    fn settings(&self) -> anyhow::Result<RunConfig> {
+        self.resolve(&toml::Table::new()).context("`settings`")
     }
 
     /// The settings with `overrides` on top; what neither says is the default.
@@ -297,5 +305,21 @@ mod tests {
         assert!(twice.contains("two runs are called open-water-stochastic-lstm-sac-seed-1"), "{twice}");
         let inner = error("steps = 1\nseeds = [1]\n[grid]\n\"env.name\" = [1]\n");
         assert!(inner.contains("not a table"), "{inner}");
+        let none = error("steps = 0\nseeds = [1]\n");
+        assert!(none.contains("open-water-stochastic-lstm-sac: steps: 0 is not possible"), "{none}");
+        let axis = error("steps = 1\nseeds = [1]\n[grid]\n\"trainer.agent.sac.discount\" = [0.9, 2.0]\n");
+        assert!(axis.contains("discount-2.0: trainer.agent.sac.discount: 2 is not possible"), "{axis}");
+    }
+
+    #[test]
+    fn a_number_that_no_run_can_work_with_is_named_by_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("sweep.toml");
+        std::fs::write(&file, "steps = 1\nseeds = [1]\n[settings.trainer]\nreplay_capacity = 0\n").unwrap();
+        let error = SweepConfig::load(&file).unwrap_err().to_string();
+        assert!(
+            error.contains("sweep.toml:4: key \"settings.trainer.replay_capacity\": 0 is not"),
+            "{error}"
+        );
     }
 }
