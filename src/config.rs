@@ -175,6 +175,20 @@ pub fn load<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     Source::read(file)?.parse()
 }
 
+/// Reads a TOML file as a `T` and checks what it says; a fault is found in the text.
+///
+/// # Errors
+/// As [`load`], and as `check`.
+pub fn load_checked<T: DeserializeOwned>(
+    file: &Path,
+    check: impl FnOnce(&T) -> Result<(), Fault>,
+) -> Result<T, ConfigError> {
+    let source = Source::read(file)?;
+    let value = source.parse()?;
+    check(&value).map_err(|fault| source.located(fault))?;
+    Ok(value)
+}
+
 /// Points from a word that is not known to the nearest that is, or lists them.
 pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();

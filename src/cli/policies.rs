@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use super::agent_run::load_forecaster;
 use crate::agent::TrainedAgent;
-use crate::config::Source;
+use crate::config;
 use crate::encounter::RulesConfig;
 use crate::forecast::{Forecaster, LstmForecaster};
 use crate::geo::Geodetic;
@@ -24,10 +24,7 @@ impl PolicyArgs {
     /// The settings; the defaults where no file is named.
     pub fn load(&self) -> anyhow::Result<PolicyConfigs> {
         let Some(file) = &self.policy_config else { return Ok(PolicyConfigs::default()) };
-        let source = Source::read(file)?;
-        let configs: PolicyConfigs = source.parse()?;
-        configs.check().map_err(|fault| source.located(fault))?;
-        Ok(configs)
+        Ok(config::load_checked(file, PolicyConfigs::check)?)
     }
 }
 
@@ -44,10 +41,7 @@ impl RulesArgs {
     /// The thresholds; the defaults where no file is named.
     pub fn load(&self) -> anyhow::Result<RulesConfig> {
         let Some(file) = &self.rules_config else { return Ok(RulesConfig::default()) };
-        let source = Source::read(file)?;
-        let rules: RulesConfig = source.parse()?;
-        rules.check().map_err(|fault| source.located(fault))?;
-        Ok(rules)
+        Ok(config::load_checked(file, |rules: &RulesConfig| rules.check())?)
     }
 }
 

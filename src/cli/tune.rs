@@ -10,7 +10,7 @@ use super::policies::PolicyArgs;
 use super::progress;
 use super::table::table;
 use crate::atomic_file;
-use crate::config::Source;
+use crate::config::{self, ConfigError};
 use crate::experiment::tuning::{self, SPACES, Score, Tuned, TuningConfig};
 
 /// Options of `searoom tune`.
@@ -46,11 +46,10 @@ pub struct Args {
     json: bool,
 }
 
-fn load(file: &Path) -> anyhow::Result<TuningConfig> {
-    let source = Source::read(file)?;
-    let config: TuningConfig = source.parse()?;
-    config.rules.check().map_err(|fault| source.located(fault.within("rules")))?;
-    Ok(config)
+fn load(file: &Path) -> Result<TuningConfig, ConfigError> {
+    config::load_checked(file, |config: &TuningConfig| {
+        config.rules.check().map_err(|fault| fault.within("rules"))
+    })
 }
 
 /// Runs the command.

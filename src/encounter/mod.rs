@@ -16,7 +16,6 @@ pub use tracker::{EncounterTracker, Risk};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{Fault, check_bounds};
-
 use crate::geo::M_PER_NMI;
 
 /// What counts as an encounter and what as good conduct in it: the tables `[encounters]` and `[compliance]`.

@@ -14,7 +14,7 @@ use indicatif::ProgressBar;
 use super::data;
 use crate::atomic_file;
 use crate::cli::progress;
-use crate::config::Source;
+use crate::config;
 use crate::forecast::{Model, ModelConfig, Trainer, Update};
 use crate::nn::weights::WeightsFile;
 use crate::report::event_file::EventWriter;
@@ -75,9 +75,7 @@ pub(super) fn run(args: &TrainArgs, out: &mut dyn Write) -> anyhow::Result<()> {
         Some(file) => file.clone(),
         None => args.out.join(CONFIG),
     };
-    let source = Source::read(&file)?;
-    let mut config: ModelConfig = source.parse()?;
-    config.check().map_err(|fault| source.located(fault))?;
+    let mut config = config::load_checked(&file, ModelConfig::check)?;
     config.training.seed = args.seed.unwrap_or(config.training.seed);
     let training = data::training_source(&config)?;
     let mut trainer = Trainer::new(config.kind, config.training.clone(), training.source, args.threads)?;
